@@ -1,0 +1,117 @@
+"""A learned behavior tree with everything that is needed to run, judge and edit it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.logic.conditions import HasCategory, IsTrue, LastActionIs, Threshold
+
+
+class SuggestionKind(Enum):
+    """Kinds of suggested alternate expressive subtrees (SAES)."""
+
+    PSA = "psa"
+    LAT_SEQUENCE = "lat_sequence"
+    LAT_REPEATER = "lat_repeater"
+
+
+@dataclass(frozen=True, slots=True)
+class Suggestion:
+    """A subtree that the user may attach."""
+
+    id: str
+    kind: SuggestionKind
+    support: int
+    """How often it occurred in the demonstrations."""
+    subtree: nodes.Node
+    attached: bool = False
+
+
+class Root(Enum):
+    """Kind of the main tree's root node."""
+
+    PARALLEL = "parallel"
+    SELECTOR = "selector"
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """How well the tree does; agreements are None where no row was held out for them."""
+
+    fidelity_mismatches: int
+    """Rows, of all there were, on which the tree differs from its decision tree."""
+    teacher_forced_agreement: float | None
+    """Share of held-out rows on which it agrees, LAT being the demonstrator's."""
+    own_history_agreement: float | None
+    """Share of held-out rows on which it agrees, LAT being its own earlier choices."""
+    held_out_rows: int
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where a tree came from."""
+
+    demonstrations: int
+    rows: int
+    delta: float
+    max_depth: int | None
+    ccp_alpha: float
+    root: Root
+    uses_last_action: bool
+    """Whether the decision tree was shown LAT."""
+    figures: Figures
+
+
+@dataclass(frozen=True, slots=True)
+class LearnedTree:
+    """The value of a behavior tree document.
+
+    Raises:
+        ValueError: The tree tests a feature, category or action, or takes an action, that is not
+            declared.
+    """
+
+    features: tuple[Feature, ...]
+    actions: tuple[nodes.Action, ...]
+    """Every action that was shown, also those that the tree never takes."""
+    tree: nodes.Node
+    provenance: Provenance
+    suggestions: tuple[Suggestion, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        for problem in self._problems():
+            raise ValueError(problem)
+
+    def _problems(self) -> Iterator[str]:
+        features = {feature.name: feature for feature in self.features}
+        if len(features) != len(self.features):
+            yield "two features have the same name"
+        labels = {action.label for action in self.actions}
+        for tree in (self.tree, *(suggestion.subtree for suggestion in self.suggestions)):
+            for action in nodes.actions(tree):
+                if action not in self.actions:
+                    yield f"action {action.label!r} on {action.channel!r} is not declared"
+            for condition in nodes.conditions(tree):
+                yield from _problems_of(condition, features, labels)
+
+
+def _problems_of(
+    node: nodes.Condition, features: dict[str, Feature], labels: set[str]
+) -> Iterator[str]:
+    match node.literal.condition:
+        case Threshold(feature=name) | IsTrue(feature=name):
+            if name not in features:
+                yield f"feature {name!r} is not declared"
+        case HasCategory(feature=name, category=category):
+            if name not in features:
+                yield f"feature {name!r} is not declared"
+            elif category not in features[name].categories:
+                yield f"feature {name!r} has no category {category!r}"
+        case LastActionIs(action=action, deciding=deciding):
+            for label in (action, *deciding):
+                if label not in labels:
+                    yield f"last action {label!r} is not declared"

@@ -1,0 +1,130 @@
+"""The behavior tree as immutable data.
+
+Sequence, Selector, Parallel
+    Control nodes; Sequence and Selector are memoryless unless they say otherwise.
+ParallelSelector
+    Actions that were shown about equally often in the same states (PSA).  The user turns it into a
+    Parallel or a Selector; it acts as a Selector until told otherwise.
+Inverter
+    Succeeds where its child fails, and the other way round.
+Repeater
+    A Sequence that starts again whenever it has succeeded, until it fails.
+Condition, Action
+    The leaves.
+
+py_trees objects, JSON, pictures and predictions are views of these values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rebt_ros.logic.conditions import Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """Succeeds where the literal holds, and fails elsewhere."""
+
+    literal: Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """Sends the command `label` on `channel`."""
+
+    label: str
+    channel: str
+
+
+@dataclass(frozen=True, slots=True)
+class Inverter:
+    """Turns its child's success into failure, and failure into success."""
+
+    child: Node
+
+
+@dataclass(frozen=True, slots=True)
+class _Control:
+    children: tuple[Node, ...]
+
+    def __post_init__(self) -> None:
+        if not self.children:
+            raise ValueError(f"a {type(self).__name__} needs children")
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence(_Control):
+    """Runs its children in order until one fails."""
+
+    memory: bool = False
+    """Whether it resumes at the child that was running, instead of at the first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Selector(_Control):
+    """Runs its children in order until one succeeds."""
+
+    memory: bool = False
+    """Whether it resumes at the child that was running, instead of at the first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parallel(_Control):
+    """Runs all its children at every tick; succeeds when all have, fails when one does."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParallelSelector(_Control):
+    """Actions to choose from (paper: Parallel Selector Actions)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Repeater(_Control):
+    """Runs its children as a Sequence with memory, again and again until one fails."""
+
+
+Composite: TypeAlias = Sequence | Selector | Parallel | ParallelSelector | Repeater
+Node: TypeAlias = Composite | Inverter | Condition | Action
+
+
+def children(node: Node) -> tuple[Node, ...]:
+    """The node's children, none for leaves."""
+    if isinstance(node, _Control):
+        return node.children
+    return (node.child,) if isinstance(node, Inverter) else ()
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """The node and all its descendants, each parent before its children."""
+    waiting = [node]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting.extend(reversed(children(node)))
+
+
+def size(node: Node) -> int:
+    """Number of nodes of the tree."""
+    return sum(1 for _ in walk(node))
+
+
+def depth(node: Node) -> int:
+    """Number of nodes on the longest way from the root to a leaf."""
+    level, deepest = [node], 0
+    while level:
+        level = [child for one in level for child in children(one)]
+        deepest += 1
+    return deepest
+
+
+def actions(node: Node) -> tuple[Action, ...]:
+    """Each action of the tree once, in the order in which it first occurs."""
+    return tuple(dict.fromkeys(one for one in walk(node) if isinstance(one, Action)))
+
+
+def conditions(node: Node) -> tuple[Condition, ...]:
+    """Each condition of the tree once, in the order in which it first occurs."""
+    return tuple(dict.fromkeys(one for one in walk(node) if isinstance(one, Condition)))

@@ -1,0 +1,233 @@
+"""The only place where rows of a demonstration are born.
+
+Callbacks of live nodes and loops over bags push the same messages, in the order in which they were
+received, into a `DemonstrationBuilder`; it answers with the rows that they complete.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from rebt_ros.demonstration.demonstration import Row
+from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.errors import InputError, OptionError
+
+#: Larger values are refused: single precision, in which decision trees compare, ends soon after.
+LARGEST_VALUE = 1e38
+
+#: Sampling pauses where no state came for this long (nanoseconds).
+_STALE = 1_000_000_000
+
+
+class Fault(Enum):
+    """What can be wrong with one message."""
+
+    UNKNOWN_TOPIC = "unknown topic"
+    EMPTY = "empty message"
+    LENGTH = "unexpected length"
+    NOT_FINITE = "value that is not finite"
+    TOO_LARGE = "value that is too large"
+    LABEL = "unusable action label"
+    NO_STATE = "action before the first state"
+
+
+class BadMessage(InputError):
+    """A message that cannot become part of a demonstration; the builder is as it was before."""
+
+    def __init__(self, fault: Fault, text: str) -> None:
+        super().__init__(text)
+        self.fault = fault
+
+
+@dataclass(frozen=True, slots=True)
+class StateTopic:
+    """A topic that carries numbers of the state."""
+
+    name: str
+    fields: tuple[str, ...] = ()
+    """Names of its values; empty: taken from the first message's labels, else from the index."""
+
+    def __post_init__(self) -> None:
+        if len(set(self.fields)) != len(self.fields):
+            raise OptionError(f"the field names of state topic {self.name!r} must differ.")
+
+
+class DemonstrationBuilder:
+    """Turns a stream of state and action messages into rows.
+
+    In event mode a row is one action message.  In sampled mode it is one instant of a fixed grid
+    on each channel that has an action, from its first message on; an empty label ends the action.
+
+    Args:
+        topics: State topics, in the order of their features.
+        channels: Action topics; each is a channel with a LAT of its own.
+        sample_rate: Rows per second and channel while an action holds; None for event mode.
+
+    Raises:
+        OptionError: No topic or channel, one named twice, or a rate that is not positive.
+    """
+
+    def __init__(
+        self,
+        topics: Sequence[StateTopic],
+        channels: Sequence[str],
+        sample_rate: float | None = None,
+    ) -> None:
+        names = [topic.name for topic in topics]
+        if not names or not channels:
+            raise OptionError("a demonstration needs at least one state topic and action topic.")
+        if len({*names, *channels}) != len(names) + len(channels):
+            raise OptionError(f"the topics {[*names, *channels]} must differ from each other.")
+        if sample_rate is not None and not (0 < sample_rate < math.inf):
+            raise OptionError(f"the sample rate must be positive, not {sample_rate}.")
+        self._fields: dict[str, tuple[str, ...]] = {one.name: one.fields for one in topics}
+        self._latest: dict[str, tuple[float, ...]] = {}
+        self._features: tuple[Feature, ...] | None = None
+        self._history = {channel: ActionHistory() for channel in channels}
+        self._held: dict[str, str] = {}
+        self._period = None if sample_rate is None else round(1e9 / sample_rate)
+        self._next_sample: int | None = None
+        self._last_observed = 0
+
+    @property
+    def features(self) -> tuple[Feature, ...] | None:
+        """The features, once every state topic has sent a message."""
+        return self._features
+
+    def observe(
+        self, stamp: int, topic: str, values: Sequence[float], labels: Sequence[str] = ()
+    ) -> tuple[Row, ...]:
+        """Takes a state message.
+
+        Args:
+            stamp: When it was received, nanoseconds.
+            topic: State topic it came on.
+            values: Its numbers.
+            labels: Names that the message itself gives to its numbers; used once, if at all.
+
+        Returns:
+            The sampled rows that were due before it; none in event mode.
+
+        Raises:
+            BadMessage: It was not taken.
+        """
+        state = tuple(map(float, values))
+        self._check_state(topic, state)
+        due = self._sample_until(stamp)
+        if topic not in self._latest and not self._fields[topic]:
+            named = len(labels) == len(state) == len(set(labels)) and all(labels)
+            self._fields[topic] = (
+                tuple(labels)
+                if named
+                else tuple(f"{_base(topic)}[{index}]" for index in range(len(state)))
+            )
+        self._latest[topic] = state
+        self._last_observed = stamp
+        if self._features is None and len(self._latest) == len(self._fields):
+            self._features = _features(self._fields)
+        return due
+
+    def act(self, stamp: int, channel: str, label: str) -> tuple[Row, ...]:
+        """Takes an action message.
+
+        Args:
+            stamp: When it was received, nanoseconds.
+            channel: Action topic it came on.
+            label: The action; empty where none is taken any longer.
+
+        Returns:
+            The rows that it completes: itself in event mode, those due before it in sampled mode.
+
+        Raises:
+            BadMessage: It was not taken.
+        """
+        if channel not in self._history:
+            raise BadMessage(Fault.UNKNOWN_TOPIC, f"{channel!r} is not one of the action topics.")
+        if any(not one.isprintable() for one in label):
+            raise BadMessage(
+                Fault.LABEL,
+                f"action topic {channel!r} sent the label {label!r}: "
+                "labels must consist of printable characters.",
+            )
+        if self._features is None:
+            silent = [topic for topic in self._fields if topic not in self._latest]
+            raise BadMessage(
+                Fault.NO_STATE,
+                f"action {label!r} came before the first message on state topic {silent[0]!r}: "
+                "it is left out, because the state it belongs to is not known.",
+            )
+        due = self._sample_until(stamp)
+        if not label:
+            self._held.pop(channel, None)
+            return due
+        self._held[channel] = label
+        if self._period is not None:
+            if self._next_sample is None:
+                self._next_sample = stamp
+            return due
+        return (self._row(stamp, channel, label),)
+
+    def _check_state(self, topic: str, state: tuple[float, ...]) -> None:
+        if topic not in self._fields:
+            raise BadMessage(Fault.UNKNOWN_TOPIC, f"{topic!r} is not one of the state topics.")
+        expected = len(self._latest.get(topic) or self._fields[topic])
+        if not state:
+            raise BadMessage(Fault.EMPTY, f"state topic {topic!r} sent a message without values.")
+        if expected and len(state) != expected:
+            raise BadMessage(
+                Fault.LENGTH,
+                f"state topic {topic!r} sent {len(state)} values where {expected} were expected: "
+                "every message of a topic must have the same length.",
+            )
+        for index, value in enumerate(state):
+            if not math.isfinite(value):
+                raise BadMessage(
+                    Fault.NOT_FINITE,
+                    f"state topic {topic!r} sent {value} at index {index}: "
+                    "replace it with a finite number before publishing.",
+                )
+            if abs(value) > LARGEST_VALUE:
+                raise BadMessage(
+                    Fault.TOO_LARGE,
+                    f"state topic {topic!r} sent {value} at index {index}: "
+                    f"values must lie within ±{LARGEST_VALUE:g}.",
+                )
+
+    def _row(self, stamp: int, channel: str, label: str) -> Row:
+        history = self._history[channel]
+        last_action = history.before(label)
+        history.take(label)
+        state = tuple(value for topic in self._fields for value in self._latest[topic])
+        return Row(stamp, channel, label, last_action, state)
+
+    def _sample_until(self, stamp: int) -> tuple[Row, ...]:
+        if self._period is None or self._next_sample is None:
+            return ()
+        rows: list[Row] = []
+        end = min(stamp, self._last_observed + _STALE)
+        while self._next_sample < end:
+            rows += [self._row(self._next_sample, *held) for held in self._held.items()]
+            self._next_sample += self._period
+        if end < stamp or self._next_sample > stamp + self._period:
+            # Silence or a clock that was set back: the grid starts anew here.
+            self._next_sample = stamp
+        return tuple(rows)
+
+
+def _features(fields: dict[str, tuple[str, ...]]) -> tuple[Feature, ...]:
+    """A feature has its field's name, led by its topic where two topics share a field name."""
+    names = [name for topic in fields for name in fields[topic]]
+    ambiguous = len(set(names)) != len(names)
+    return tuple(
+        Feature(f"{topic}/{name}" if ambiguous else name, topic=topic, index=index)
+        for topic in fields
+        for index, name in enumerate(fields[topic])
+    )
+
+
+def _base(topic: str) -> str:
+    return topic.rsplit("/", 1)[-1]

@@ -1,0 +1,117 @@
+"""A demonstration: one uninterrupted recording of states and the actions taken in them."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.demonstration.schema import Feature
+
+#: Channel of actions that came without a topic, as in a CSV table.
+DEFAULT_CHANNEL = "action"
+
+
+class Row(NamedTuple):
+    """One action event with the state that held at that moment."""
+
+    stamp: int
+    """Nanoseconds."""
+    channel: str
+    """Action topic it came on."""
+    action: str
+    last_action: str | None
+    """LAT of its channel; None before a second action was taken."""
+    state: tuple[float, ...]
+    """In the order of the demonstration's features; NaN where missing."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Demonstration:
+    """The rows of one demonstration, by column.
+
+    LAT is not among them: it follows from the actions (see `last_action`).
+    """
+
+    name: str
+    """Where it came from, for messages."""
+    features: tuple[Feature, ...]
+    states: FloatArray
+    """Shape (rows, features)."""
+    stamps: IntArray
+    """Nanoseconds, shape (rows,)."""
+    actions: tuple[str, ...]
+    """Labels that occur, sorted."""
+    chosen: IntArray
+    """Position in `actions` of each row's action, shape (rows,)."""
+    channels: tuple[str, ...]
+    """Channels that occur, sorted."""
+    channel: IntArray
+    """Position in `channels` of each row's channel, shape (rows,)."""
+
+    def __post_init__(self) -> None:
+        rows = len(self.chosen)
+        if self.states.shape != (rows, len(self.features)):
+            raise ValueError(
+                f"{rows} actions and {len(self.features)} features need states of shape "
+                f"({rows}, {len(self.features)}), not {self.states.shape}"
+            )
+        if len(self.stamps) != rows or len(self.channel) != rows:
+            raise ValueError(
+                f"{rows} actions, {len(self.stamps)} stamps and {len(self.channel)} channels"
+            )
+
+    def __len__(self) -> int:
+        return len(self.chosen)
+
+    @classmethod
+    def from_rows(
+        cls, name: str, features: tuple[Feature, ...], rows: Iterable[Row]
+    ) -> Demonstration:
+        """Gathers rows into columns, without keeping them."""
+        stamps, values = array("q"), array("d")
+        actions = _Codes()
+        channels = _Codes()
+        for row in rows:
+            stamps.append(row.stamp)
+            values.extend(row.state)
+            actions.append(row.action)
+            channels.append(row.channel)
+        return cls(
+            name,
+            features,
+            np.frombuffer(values).reshape(len(stamps), len(features)),
+            np.frombuffer(stamps, dtype=np.int64),
+            *actions.sorted(),
+            *channels.sorted(),
+        )
+
+
+class _Codes:
+    """A column of strings as integers, growing row by row."""
+
+    def __init__(self) -> None:
+        self._code: dict[str, int] = {}
+        self._column = array("q")
+
+    def append(self, label: str) -> None:
+        self._column.append(self._code.setdefault(label, len(self._code)))
+
+    def sorted(self) -> tuple[tuple[str, ...], IntArray]:
+        return in_sorted_order(tuple(self._code), np.frombuffer(self._column, dtype=np.int64))
+
+
+def in_sorted_order(labels: tuple[str, ...], codes: IntArray) -> tuple[tuple[str, ...], IntArray]:
+    """The same column of strings with its labels sorted.
+
+    >>> in_sorted_order(("turn", "go"), np.array([0, 1, 1]))
+    (('go', 'turn'), array([1, 0, 0]))
+    """
+    order = sorted(range(len(labels)), key=labels.__getitem__)
+    position = np.empty(len(labels), dtype=np.int64)
+    position[order] = np.arange(len(labels))
+    return tuple(labels[one] for one in order), position[codes]

@@ -1,0 +1,68 @@
+"""The last action taken (LAT): the most recent action that differs from row t's (paper, III-B)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from rebt_ros.arrays import IntArray
+
+#: Code of "no action yet" in integer columns of last actions.
+NO_ACTION = -1
+
+
+class ActionHistory:
+    """The distinct actions taken so far on one channel, most recent first.
+
+    >>> history = ActionHistory(["turn", "go", "go"])
+    >>> history.before("go"), history.before("turn"), history.before("stop")
+    ('turn', 'go', 'go')
+    """
+
+    def __init__(self, actions: Iterable[str] = ()) -> None:
+        self._recent: list[str] = []
+        for action in actions:
+            self.take(action)
+
+    def take(self, action: str) -> None:
+        """Notes that `action` was taken now."""
+        if self._recent and self._recent[0] == action:
+            return
+        if action in self._recent:
+            self._recent.remove(action)
+        self._recent.insert(0, action)
+
+    def before(self, *deciding: str) -> str | None:
+        """LAT as seen by a rule for `deciding`: the most recent action that is none of them."""
+        return next((action for action in self._recent if action not in deciding), None)
+
+    def clear(self) -> None:
+        """Forgets everything, as at the start of a demonstration."""
+        self._recent.clear()
+
+
+def last_actions(actions: IntArray, demonstrations: IntArray) -> IntArray:
+    """LAT of every row of one channel.
+
+    Args:
+        actions: Action codes in the order in which they were taken, shape (rows,).
+        demonstrations: Number of each row's demonstration, shape (rows,); its rows stand together.
+
+    Returns:
+        Codes of the last actions taken, shape (rows,); `NO_ACTION` where there is none.
+
+    >>> last_actions(np.array([0, 0, 1, 0, 2]), np.array([0, 0, 0, 0, 1])).tolist()
+    [-1, -1, 0, 1, -1]
+    """
+    rows = len(actions)
+    if rows == 0:
+        return np.empty(0, dtype=np.int64)
+    border = np.empty(rows, dtype=bool)
+    border[0] = True
+    border[1:] = demonstrations[1:] != demonstrations[:-1]
+    changed = border.copy()
+    changed[1:] |= actions[1:] != actions[:-1]
+    # All rows of a run of equal actions look back at the row before the run.
+    start = np.maximum.accumulate(np.where(changed, np.arange(rows), 0))
+    return np.where(border[start], NO_ACTION, actions[start - 1]).astype(np.int64)

@@ -1,0 +1,234 @@
+"""The table that is learned from: the rows of all demonstrations of one channel, with LAT."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.last_action import last_actions
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.errors import InputError, OptionError
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DemonstrationTable:
+    """Rows in the order in which they were shown, demonstration after demonstration."""
+
+    channel: str
+    features: tuple[Feature, ...]
+    states: FloatArray
+    """Shape (rows, features): numbers, 0 or 1, positions in a feature's categories, or NaN."""
+    actions: tuple[str, ...]
+    """Labels that occur, sorted."""
+    chosen: IntArray
+    """Position in `actions` of each row's action, shape (rows,)."""
+    demonstrations: tuple[str, ...]
+    """Names of the demonstrations."""
+    demonstration: IntArray
+    """Position in `demonstrations` of each row's one, ascending, shape (rows,)."""
+    stamps: IntArray
+    """Nanoseconds, shape (rows,)."""
+    last: IntArray = field(init=False)
+    """Position in `actions` of each row's LAT, `NO_ACTION` where there is none, shape (rows,)."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "last", last_actions(self.chosen, self.demonstration))
+
+    def __len__(self) -> int:
+        return len(self.chosen)
+
+    def where(self, rows: BoolArray) -> DemonstrationTable:
+        """The table of some rows only.
+
+        LAT is derived anew: a part that begins inside a demonstration begins without one.
+        """
+        return replace(
+            self,
+            states=self.states[rows],
+            chosen=self.chosen[rows],
+            demonstration=self.demonstration[rows],
+            stamps=self.stamps[rows],
+        )
+
+    def held_out(self, fraction: float) -> BoolArray:
+        """Which rows to test on rather than to learn from, shape (rows,).
+
+        The last rows where there is one demonstration; whole demonstrations, the last ones, where
+        there are several, so that no row is tested whose neighbours were learned from.
+
+        Args:
+            fraction: Share to hold out, in [0, 1); at least one row, or demonstration, if above 0.
+        """
+        shown = np.unique(self.demonstration)
+        if fraction == 0 or len(self) < 2:
+            return np.zeros(len(self), dtype=bool)
+        if len(shown) == 1:
+            return np.arange(len(self)) >= _share_kept(len(self), fraction)
+        return self.demonstration >= shown[_share_kept(len(shown), fraction)]
+
+
+def _share_kept(count: int, fraction: float) -> int:
+    return min(max(int(count * (1 - fraction)), 1), count - 1)
+
+
+def tabulate(
+    demonstrations: Sequence[Demonstration],
+    declared: Mapping[str, FeatureKind] | None = None,
+) -> tuple[DemonstrationTable, ...]:
+    """Joins demonstrations into one table per channel.
+
+    Args:
+        demonstrations: At least one; all with the same features in the same order.
+        declared: Kinds of features by name.  A feature that is not declared and holds nothing but
+            0 and 1, and both of them, is binary; otherwise it stays what it is.
+
+    Raises:
+        InputError: No rows, or demonstrations whose features differ.
+        OptionError: A declared feature does not exist or does not hold such values.
+    """
+    demonstrations = [one for one in demonstrations if len(one)]
+    if not demonstrations:
+        raise InputError(
+            "there are no demonstration rows: record actions together with states first."
+        )
+    features, states = _joined_states(demonstrations)
+    features, states = _with_kinds(features, states, declared or {})
+    channels = sorted({channel for one in demonstrations for channel in one.channels})
+    return tuple(
+        _channel_table(channel, demonstrations, features, states) for channel in channels
+    )
+
+
+def _channel_table(
+    channel: str,
+    demonstrations: Sequence[Demonstration],
+    features: tuple[Feature, ...],
+    states: FloatArray,
+) -> DemonstrationTable:
+    channel_of_row = np.concatenate([np.array(one.channels)[one.channel] for one in demonstrations])
+    rows = channel_of_row == channel
+    labels = np.concatenate([np.array(one.actions)[one.chosen] for one in demonstrations])[rows]
+    actions, chosen = np.unique(labels, return_inverse=True)
+    lengths = [len(one) for one in demonstrations]
+    return DemonstrationTable(
+        channel,
+        features,
+        states[rows],
+        tuple(map(str, actions)),
+        chosen.astype(np.int64),
+        tuple(one.name for one in demonstrations),
+        np.repeat(np.arange(len(demonstrations)), lengths)[rows],
+        np.concatenate([one.stamps for one in demonstrations])[rows],
+    )
+
+
+def _joined_states(
+    demonstrations: Sequence[Demonstration],
+) -> tuple[tuple[Feature, ...], FloatArray]:
+    first = demonstrations[0]
+    for other in demonstrations[1:]:
+        mine, its = [one.name for one in first.features], [one.name for one in other.features]
+        if mine != its:
+            differing = sorted(set(mine) ^ set(its)) or its
+            raise InputError(
+                f"{first.name} and {other.name} have different features "
+                f"({', '.join(differing[:3])}): learn from demonstrations of one robot and set-up."
+            )
+    features = tuple(map(_unified, *(one.features for one in demonstrations)))
+    return features, np.concatenate(
+        [
+            np.column_stack(
+                [
+                    _recoded(one.states[:, index], mine, unified)
+                    for index, (mine, unified) in enumerate(
+                        zip(one.features, features, strict=True)
+                    )
+                ]
+            )
+            if features
+            else one.states
+            for one in demonstrations
+        ]
+    )
+
+
+def _unified(first: Feature, *others: Feature) -> Feature:
+    """One feature that holds the values of the same feature in several demonstrations."""
+    kinds = {one.kind for one in (first, *others)}
+    if FeatureKind.CATEGORICAL not in kinds:
+        return first if kinds == {first.kind} else replace(first, kind=FeatureKind.NUMERIC)
+    if kinds != {FeatureKind.CATEGORICAL}:
+        raise InputError(
+            f"feature {first.name!r} holds text in one demonstration and numbers in another: "
+            "give it one kind of values."
+        )
+    categories = sorted({name for one in (first, *others) for name in one.categories})
+    return replace(first, categories=tuple(categories))
+
+
+def _recoded(column: FloatArray, mine: Feature, unified: Feature) -> FloatArray:
+    if mine.categories == unified.categories:
+        return column
+    position = np.array([unified.categories.index(name) for name in mine.categories], dtype=float)
+    known = ~np.isnan(column)
+    recoded = np.full_like(column, np.nan)
+    recoded[known] = position[column[known].astype(np.int64)]
+    return recoded
+
+
+def _with_kinds(
+    features: tuple[Feature, ...], states: FloatArray, declared: Mapping[str, FeatureKind]
+) -> tuple[tuple[Feature, ...], FloatArray]:
+    unknown = sorted(set(declared) - {feature.name for feature in features})
+    if unknown:
+        raise OptionError(
+            f"there is no feature {unknown[0]!r}: "
+            f"the features are {', '.join(feature.name for feature in features)}."
+        )
+    typed: list[Feature] = []
+    states = states.copy()
+    for index, feature in enumerate(features):
+        values = np.unique(states[:, index])
+        values = values[~np.isnan(values)]
+        kind = declared.get(feature.name, _detected(feature, values))
+        _check_kind(feature, kind, values)
+        if kind is feature.kind:
+            typed.append(feature)
+        elif kind is FeatureKind.CATEGORICAL:
+            typed.append(
+                replace(feature, kind=kind, categories=tuple(category(value) for value in values))
+            )
+            known = ~np.isnan(states[:, index])
+            states[known, index] = np.searchsorted(values, states[known, index])
+        else:
+            typed.append(replace(feature, kind=kind))
+    return tuple(typed), states
+
+
+def _detected(feature: Feature, values: FloatArray) -> FeatureKind:
+    binary = feature.kind is FeatureKind.NUMERIC and values.tolist() == [0.0, 1.0]
+    return FeatureKind.BINARY if binary else feature.kind
+
+
+def _check_kind(feature: Feature, kind: FeatureKind, values: FloatArray) -> None:
+    text_as_numbers = feature.kind is FeatureKind.CATEGORICAL and kind is not feature.kind
+    not_binary = kind is FeatureKind.BINARY and not np.isin(values, (0.0, 1.0)).all()
+    if text_as_numbers or not_binary or (kind is FeatureKind.CATEGORICAL and not len(values)):
+        raise OptionError(
+            f"feature {feature.name!r} cannot be {kind.value}: it holds "
+            + ("text." if text_as_numbers else f"{', '.join(map(category, values[:3]))}…")
+        )
+
+
+def category(value: float) -> str:
+    """How a number names a category.
+
+    >>> category(3.0), category(0.5)
+    ('3', '0.5')
+    """
+    return str(int(value)) if math.isfinite(value) and value == int(value) else repr(float(value))

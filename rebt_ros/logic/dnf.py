@@ -1,0 +1,63 @@
+"""Conjunctions and disjunctive normal forms (DNF).
+
+The literals of a conjunction and the conjunctions of a DNF are ordered, so that what is printed,
+drawn and compared is the same in every run.  Their order has no logical meaning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rebt_ros.logic.conditions import Condition, Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Conjunction:
+    """An AND of literals; without literals it is TRUE."""
+
+    literals: tuple[Literal, ...] = ()
+
+    def __post_init__(self) -> None:
+        conditions = {literal.condition for literal in self.literals}
+        if len(conditions) != len(self.literals):
+            raise ValueError(f"a conjunction names each condition once, not {self.literals}")
+
+    def __iter__(self) -> Iterator[Literal]:
+        return iter(self.literals)
+
+    def __len__(self) -> int:
+        return len(self.literals)
+
+    def without(self, literals: frozenset[Literal]) -> Conjunction:
+        """The conjunction less the given literals, in the same order."""
+        return Conjunction(tuple(one for one in self.literals if one not in literals))
+
+
+@dataclass(frozen=True, slots=True)
+class Dnf:
+    """An OR of conjunctions; without conjunctions it is FALSE."""
+
+    conjunctions: tuple[Conjunction, ...] = ()
+
+    def __iter__(self) -> Iterator[Conjunction]:
+        return iter(self.conjunctions)
+
+    def __len__(self) -> int:
+        return len(self.conjunctions)
+
+    @property
+    def is_true(self) -> bool:
+        """Whether a conjunction without literals makes it TRUE."""
+        return any(not conjunction.literals for conjunction in self.conjunctions)
+
+
+TRUE = Dnf((Conjunction(),))
+FALSE = Dnf()
+
+
+def conditions_of(dnf: Dnf) -> tuple[Condition, ...]:
+    """Each condition of the DNF once, in the order in which it first occurs."""
+    return tuple(
+        dict.fromkeys(literal.condition for conjunction in dnf for literal in conjunction)
+    )

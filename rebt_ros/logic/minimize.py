@@ -1,0 +1,58 @@
+"""Two-level minimization with Berkeley espresso (Algorithm 1, line 4: LOGIC_MINIMIZER).
+
+The only module that knows pyeda.  Espresso is fed cubes, one small integer per condition, never
+symbolic expressions: those would have to be built, ordered and taken apart again.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from pyeda.boolalg.espresso import DTYPE, FTYPE, espresso
+
+from rebt_ros.logic.conditions import Condition, Literal
+from rebt_ros.logic.dnf import FALSE, TRUE, Conjunction, Dnf, conditions_of
+
+#: Positional cube notation: what espresso calls the value of one input.
+_NEGATIVE, _POSITIVE, _ABSENT = 1, 2, 3
+#: Value of the only output: in the ON-set, or free to be either.
+_ON, _DONT_CARE = 1, 2
+
+_Cube: TypeAlias = tuple[int, ...]
+
+
+def minimize(dnf: Dnf, dont_care: Dnf = FALSE) -> Dnf:
+    """An equivalent DNF with (nearly) the fewest conjunctions and literals.
+
+    Args:
+        dnf: Where the rule must hold.
+        dont_care: Where the result may do either.
+
+    Returns:
+        A DNF equal to `dnf` on every assignment of its conditions outside `dont_care`.  Literals
+        keep the order in which their conditions first occur; conjunctions are sorted.
+    """
+    if dnf.is_true or dnf == FALSE:
+        # Espresso has no cubes of zero inputs.
+        return TRUE if dnf.is_true else FALSE
+    vocabulary = conditions_of(Dnf(dnf.conjunctions + dont_care.conjunctions))
+    cover = [(_cube(conjunction, vocabulary), (_ON,)) for conjunction in dnf]
+    cover += [(_cube(conjunction, vocabulary), (_DONT_CARE,)) for conjunction in dont_care]
+    minimized = espresso(len(vocabulary), 1, cover, FTYPE | DTYPE)
+    cubes = sorted((inputs for inputs, _ in minimized), reverse=True)
+    return Dnf(tuple(_conjunction(cube, vocabulary) for cube in cubes))
+
+
+def _cube(conjunction: Conjunction, vocabulary: tuple[Condition, ...]) -> _Cube:
+    sign = {one.condition: _POSITIVE if one.positive else _NEGATIVE for one in conjunction}
+    return tuple(sign.get(condition, _ABSENT) for condition in vocabulary)
+
+
+def _conjunction(cube: _Cube, vocabulary: tuple[Condition, ...]) -> Conjunction:
+    return Conjunction(
+        tuple(
+            Literal(condition, positive=value == _POSITIVE)
+            for condition, value in zip(vocabulary, cube, strict=True)
+            if value != _ABSENT
+        )
+    )
