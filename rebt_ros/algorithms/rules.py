@@ -1,0 +1,102 @@
+"""From a decision tree to rules, one for each action (Algorithm 1, line 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from rebt_ros.behavior_tree.nodes import Action
+from rebt_ros.decision_tree.tree import DecisionTree, Leaf
+from rebt_ros.logic.conditions import LastActionIs, deciding
+from rebt_ros.logic.dnf import Conjunction, Dnf
+from rebt_ros.logic.factoring import Factored
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A DNF with the action that it triggers, or the set of δ-close actions (PSA)."""
+
+    actions: tuple[Action, ...]
+    """One action, or those of a PSA group with the best supported first."""
+    dnf: Dnf
+    support: int
+    """Training rows in its leaves."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the actions."""
+        return tuple(action.label for action in self.actions)
+
+
+@dataclass(frozen=True, slots=True)
+class FactoredRule:
+    """A rule whose DNF has been factored."""
+
+    actions: tuple[Action, ...]
+    condition: Factored
+
+
+def dt_to_rules(tree: DecisionTree) -> tuple[Rule, ...]:
+    """BT-Espresso's rules: each leaf triggers its most probable action."""
+    return _rules(tree, lambda leaf: (leaf.most_probable,))
+
+
+def dt_to_rules_psa(tree: DecisionTree, delta: float) -> tuple[Rule, ...]:
+    """RE:BT-Espresso's rules: each leaf triggers all its δ-close actions, as one.
+
+    Args:
+        tree: The decision tree.
+        delta: In [0, 1]; a leaf's actions with a share of at least ``(1 - delta)`` of its largest
+            share are δ-close (paper, III-B).  0 keeps exact ties only.
+
+    Returns:
+        Rules that no two leaves share and that together cover every state, the best supported
+        first.  Each has the literals of its LAT conditions decide its own actions.
+    """
+    return _rules(tree, lambda leaf: delta_close(leaf, delta))
+
+
+def delta_close(leaf: Leaf, delta: float) -> tuple[int, ...]:
+    """Positions of the leaf's δ-close actions, ascending.
+
+    >>> delta_close(Leaf((7, 10, 0)), 0.3)
+    (0, 1)
+    """
+    # The tolerance forgives the rounding of 1 - delta, not of the counts, which are whole.
+    least = (1 - delta) * max(leaf.distribution) - 1e-9
+    return tuple(
+        action for action, rows in enumerate(leaf.distribution) if rows > 0 and rows >= least
+    )
+
+
+def _rules(tree: DecisionTree, triggered: Callable[[Leaf], tuple[int, ...]]) -> tuple[Rule, ...]:
+    leaves: dict[tuple[int, ...], list[tuple[Conjunction, Leaf]]] = {}
+    for conjunction, leaf in tree.paths():
+        leaves.setdefault(triggered(leaf), []).append((conjunction, leaf))
+    rules = [_rule(tree, group, paths) for group, paths in leaves.items()]
+    return tuple(sorted(rules, key=lambda rule: -rule.support))
+
+
+def _rule(
+    tree: DecisionTree, group: tuple[int, ...], paths: list[tuple[Conjunction, Leaf]]
+) -> Rule:
+    support = [sum(leaf.distribution[one] for _, leaf in paths) for one in group]
+    # sorted() is stable, so that of equally supported actions the one that the decision tree
+    # itself would choose comes first.
+    ranked = sorted(zip(support, group, strict=True), key=lambda pair: -pair[0])
+    actions = tuple(tree.actions[one] for _, one in ranked)
+    rows = sum(sum(leaf.distribution) for _, leaf in paths)
+    return Rule(actions, in_rule_of(actions, (conjunction for conjunction, _ in paths)), rows)
+
+
+def in_rule_of(actions: Iterable[Action], conjunctions: Iterable[Conjunction]) -> Dnf:
+    """The conjunctions with their LAT literals meant from the side of a rule for `actions`."""
+    labels = tuple(action.label for action in actions)
+    return Dnf(
+        tuple(
+            Conjunction(tuple(deciding(literal, labels) for literal in conjunction))
+            if any(isinstance(one.condition, LastActionIs) for one in conjunction)
+            else conjunction
+            for conjunction in conjunctions
+        )
+    )

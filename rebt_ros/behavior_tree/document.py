@@ -1,0 +1,386 @@
+"""The behavior tree document: one versioned JSON format for topic, disk and page.
+
+`dumps` and `loads` are inverse to each other, to the last bit of every threshold.  What `loads`
+accepts is described, for other programs, by the JSON Schema beside this module; a test holds the
+two together.  A document comes from outside: it is read with bounds on its size and depth, and
+anything that is not expected is refused with the place where it stands.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from enum import Enum
+from importlib import resources
+from typing import Any, NoReturn, TypeAlias, TypeVar
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import (
+    Figures,
+    LearnedTree,
+    Provenance,
+    Root,
+    Suggestion,
+    SuggestionKind,
+)
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.errors import DocumentError
+from rebt_ros.logic.conditions import (
+    Condition,
+    HasCategory,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    Threshold,
+)
+
+FORMAT = "rebt_ros/behavior_tree"
+VERSION = 1
+
+#: Longest document that is read, in characters.
+LARGEST_DOCUMENT = 16_000_000
+#: Longest way from a tree's root to a leaf, in nodes.
+DEEPEST_TREE = 100
+
+Json: TypeAlias = dict[str, Any]
+_T = TypeVar("_T")
+_E = TypeVar("_E", bound=Enum)
+
+_COMPOSITES: dict[str, type[nodes.Composite]] = {
+    "sequence": nodes.Sequence,
+    "selector": nodes.Selector,
+    "parallel": nodes.Parallel,
+    "parallel_selector": nodes.ParallelSelector,
+    "repeater": nodes.Repeater,
+}
+_TYPE_NAMES = {kind: name for name, kind in _COMPOSITES.items()}
+
+
+def json_schema() -> Json:
+    """The JSON Schema (draft 2020-12) of the document."""
+    source = resources.files(__package__).joinpath("behavior_tree.schema.json")
+    schema: Json = json.loads(source.read_text(encoding="utf-8"))
+    return schema
+
+
+def dumps(learned: LearnedTree) -> str:
+    """The document as JSON text."""
+    return json.dumps(_encode(learned), indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def loads(text: str) -> LearnedTree:
+    """The learned tree of a document.
+
+    Raises:
+        DocumentError: The text is not such a document; the message says where and why.
+    """
+    if len(text) > LARGEST_DOCUMENT:
+        raise DocumentError(
+            f"the document has {len(text)} characters: at most {LARGEST_DOCUMENT} are read."
+        )
+    try:
+        value = json.loads(text, parse_constant=_refuse_constant)
+    except RecursionError as err:
+        raise DocumentError("the document is nested too deeply to be read.") from err
+    except ValueError as err:
+        raise DocumentError(f"the document is not JSON: {err}.") from err
+    return _learned_tree(_Place(value, "document"))
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a number")
+
+
+def _encode(learned: LearnedTree) -> Json:
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "features": [_encode_feature(feature) for feature in learned.features],
+        "actions": [{"label": one.label, "channel": one.channel} for one in learned.actions],
+        "tree": _encode_node(learned.tree),
+        "suggestions": [
+            {
+                "id": one.id,
+                "kind": one.kind.value,
+                "support": one.support,
+                "attached": one.attached,
+                "tree": _encode_node(one.subtree),
+            }
+            for one in learned.suggestions
+        ],
+        "provenance": _encode_provenance(learned.provenance),
+    }
+
+
+def _encode_provenance(provenance: Provenance) -> Json:
+    figures = provenance.figures
+    return {
+        "demonstrations": provenance.demonstrations,
+        "rows": provenance.rows,
+        "delta": provenance.delta,
+        "max_depth": provenance.max_depth,
+        "ccp_alpha": provenance.ccp_alpha,
+        "root": provenance.root.value,
+        "uses_last_action": provenance.uses_last_action,
+        "figures": {
+            "fidelity_mismatches": figures.fidelity_mismatches,
+            "teacher_forced_agreement": figures.teacher_forced_agreement,
+            "own_history_agreement": figures.own_history_agreement,
+            "held_out_rows": figures.held_out_rows,
+        },
+    }
+
+
+def _encode_feature(feature: Feature) -> Json:
+    encoded: Json = {"name": feature.name, "kind": feature.kind.value}
+    if feature.categories:
+        encoded["categories"] = list(feature.categories)
+    if feature.topic is not None:
+        encoded |= {"topic": feature.topic, "index": feature.index}
+    return encoded
+
+
+def _encode_node(node: nodes.Node) -> Json:
+    match node:
+        case nodes.Condition(literal=literal):
+            test = _encode_condition(literal.condition)
+            return {"type": "condition", "test": test, "positive": literal.positive}
+        case nodes.Action(label=label, channel=channel):
+            return {"type": "action", "label": label, "channel": channel}
+        case nodes.Inverter(child=child):
+            return {"type": "inverter", "child": _encode_node(child)}
+        case _:
+            encoded: Json = {"type": _TYPE_NAMES[type(node)]}
+            if isinstance(node, nodes.Sequence | nodes.Selector) and node.memory:
+                encoded["memory"] = True
+            return encoded | {"children": [_encode_node(child) for child in node.children]}
+
+
+def _encode_condition(condition: Condition) -> Json:
+    match condition:
+        case Threshold(feature=feature, value=value):
+            return {"type": "threshold", "feature": feature, "at_most": value}
+        case IsTrue(feature=feature):
+            return {"type": "is_true", "feature": feature}
+        case HasCategory(feature=feature, category=category):
+            return {"type": "has_category", "feature": feature, "category": category}
+        case LastActionIs(action=action, deciding=deciding):
+            return {"type": "last_action_is", "action": action, "deciding": list(deciding)}
+
+
+class _Place:
+    """A value of the document and the way to it, for messages."""
+
+    def __init__(self, value: object, path: str) -> None:
+        self.value = value
+        self.path = path
+
+    def refuse(self, expected: str) -> NoReturn:
+        shown = repr(self.value)
+        shown = shown if len(shown) <= 60 else f"{shown[:60]}…"
+        raise DocumentError(f"{self.path} must be {expected}, not {shown}.")
+
+    def fields(self, *required: str, optional: tuple[str, ...] = ()) -> dict[str, _Place]:
+        """The fields of an object that has all of `required` and nothing unknown."""
+        if not isinstance(self.value, dict):
+            self.refuse("an object")
+        missing = [name for name in required if name not in self.value]
+        unknown = [name for name in self.value if name not in (*required, *optional)]
+        if missing:
+            raise DocumentError(f"{self.path} lacks {missing[0]!r}.")
+        if unknown:
+            raise DocumentError(f"{self.path} has the unknown field {unknown[0]!r}.")
+        return {name: _Place(value, f"{self.path}.{name}") for name, value in self.value.items()}
+
+    def items(self, read: Callable[[_Place], _T], least: int = 0) -> tuple[_T, ...]:
+        """The elements of an array."""
+        if not isinstance(self.value, list) or len(self.value) < least:
+            self.refuse(f"an array of at least {least} elements" if least else "an array")
+        return tuple(
+            read(_Place(value, f"{self.path}[{index}]")) for index, value in enumerate(self.value)
+        )
+
+    def tag(self, name: str) -> str:
+        """The text in field `name`, which tells what else the object holds."""
+        if not isinstance(self.value, dict) or not isinstance(self.value.get(name), str):
+            self.refuse(f"an object with a {name!r}")
+        tag: str = self.value[name]
+        return tag
+
+    def text(self) -> str:
+        if not isinstance(self.value, str):
+            self.refuse("a text")
+        if any("\ud800" <= one <= "\udfff" for one in self.value):
+            self.refuse("a text of whole characters")
+        return self.value
+
+    def number(self, least: float = -math.inf, most: float = math.inf) -> float:
+        if isinstance(self.value, bool) or not isinstance(self.value, int | float):
+            self.refuse("a number")
+        try:
+            number = float(self.value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number) or not least <= number <= most:
+            bounded = least > -math.inf or most < math.inf
+            self.refuse(f"a number from {least:g} to {most:g}" if bounded else "a finite number")
+        return number
+
+    def whole(self, least: int = 0) -> int:
+        number = self.value
+        if isinstance(number, float) and number.is_integer():
+            # JSON does not tell 2.0 from 2.
+            number = int(number)
+        if isinstance(number, bool) or not isinstance(number, int) or number < least:
+            self.refuse(f"a whole number of at least {least}")
+        return number
+
+    def truth(self) -> bool:
+        if not isinstance(self.value, bool):
+            self.refuse("true or false")
+        return self.value
+
+    def one_of(self, kind: type[_E]) -> _E:
+        for member in kind:
+            if member.value == self.value:
+                return member
+        self.refuse(f"one of {', '.join(str(member.value) for member in kind)}")
+
+    def or_null(self, read: Callable[[], _T]) -> _T | None:
+        return None if self.value is None else read()
+
+
+def _learned_tree(place: _Place) -> LearnedTree:
+    if not isinstance(place.value, dict) or place.value.get("format") != FORMAT:
+        raise DocumentError(f"the document does not say that its format is {FORMAT!r}.")
+    if place.value.get("version") != VERSION or isinstance(place.value["version"], bool):
+        raise DocumentError(
+            f"the document has version {place.value.get('version')!r}: "
+            f"this release of rebt_ros reads version {VERSION}."
+        )
+    fields = place.fields(
+        "format", "version", "features", "actions", "tree", "suggestions", "provenance"
+    )
+    try:
+        return LearnedTree(
+            features=fields["features"].items(_feature),
+            actions=fields["actions"].items(_declared_action, least=1),
+            tree=_node(fields["tree"], DEEPEST_TREE),
+            provenance=_provenance(fields["provenance"]),
+            suggestions=fields["suggestions"].items(_suggestion),
+        )
+    except ValueError as err:
+        raise DocumentError(f"the document contradicts itself: {err}.") from err
+
+
+def _feature(place: _Place) -> Feature:
+    fields = place.fields("name", "kind", optional=("categories", "topic", "index"))
+    categories = fields["categories"].items(_Place.text) if "categories" in fields else ()
+    return Feature(
+        fields["name"].text(),
+        fields["kind"].one_of(FeatureKind),
+        categories,
+        fields["topic"].text() if "topic" in fields else None,
+        fields["index"].whole() if "index" in fields else None,
+    )
+
+
+def _declared_action(place: _Place) -> nodes.Action:
+    fields = place.fields("label", "channel")
+    return nodes.Action(fields["label"].text(), fields["channel"].text())
+
+
+def _suggestion(place: _Place) -> Suggestion:
+    fields = place.fields("id", "kind", "support", "attached", "tree")
+    return Suggestion(
+        fields["id"].text(),
+        fields["kind"].one_of(SuggestionKind),
+        fields["support"].whole(),
+        _node(fields["tree"], DEEPEST_TREE),
+        fields["attached"].truth(),
+    )
+
+
+def _provenance(place: _Place) -> Provenance:
+    fields = place.fields(
+        "demonstrations",
+        "rows",
+        "delta",
+        "max_depth",
+        "ccp_alpha",
+        "root",
+        "uses_last_action",
+        "figures",
+    )
+    return Provenance(
+        demonstrations=fields["demonstrations"].whole(),
+        rows=fields["rows"].whole(),
+        delta=fields["delta"].number(0, 1),
+        max_depth=fields["max_depth"].or_null(lambda: fields["max_depth"].whole(1)),
+        ccp_alpha=fields["ccp_alpha"].number(0),
+        root=fields["root"].one_of(Root),
+        uses_last_action=fields["uses_last_action"].truth(),
+        figures=_figures(fields["figures"]),
+    )
+
+
+def _figures(place: _Place) -> Figures:
+    fields = place.fields(
+        "fidelity_mismatches",
+        "teacher_forced_agreement",
+        "own_history_agreement",
+        "held_out_rows",
+    )
+    forced, own = fields["teacher_forced_agreement"], fields["own_history_agreement"]
+    return Figures(
+        fidelity_mismatches=fields["fidelity_mismatches"].whole(),
+        teacher_forced_agreement=forced.or_null(lambda: forced.number(0, 1)),
+        own_history_agreement=own.or_null(lambda: own.number(0, 1)),
+        held_out_rows=fields["held_out_rows"].whole(),
+    )
+
+
+def _node(place: _Place, levels: int) -> nodes.Node:
+    if levels == 0:
+        raise DocumentError(f"the tree has more than {DEEPEST_TREE} levels.")
+    kind = place.tag("type")
+    if kind == "condition":
+        fields = place.fields("type", "test", "positive")
+        return nodes.Condition(Literal(_condition(fields["test"]), fields["positive"].truth()))
+    if kind == "action":
+        fields = place.fields("type", "label", "channel")
+        return nodes.Action(fields["label"].text(), fields["channel"].text())
+    if kind == "inverter":
+        return nodes.Inverter(_node(place.fields("type", "child")["child"], levels - 1))
+    composite = _COMPOSITES.get(kind)
+    if composite is None:
+        raise DocumentError(f"{place.path} has the unknown type {kind!r}.")
+    remembering = composite is nodes.Sequence or composite is nodes.Selector
+    fields = place.fields("type", "children", optional=("memory",) if remembering else ())
+    children = fields["children"].items(lambda child: _node(child, levels - 1), least=1)
+    if "memory" in fields:
+        resuming: Mapping[str, type[nodes.Sequence | nodes.Selector]] = {
+            "sequence": nodes.Sequence,
+            "selector": nodes.Selector,
+        }
+        return resuming[kind](children, memory=fields["memory"].truth())
+    return composite(children)
+
+
+def _condition(place: _Place) -> Condition:
+    match place.tag("type"):
+        case "threshold":
+            fields = place.fields("type", "feature", "at_most")
+            return Threshold(fields["feature"].text(), fields["at_most"].number())
+        case "is_true":
+            return IsTrue(place.fields("type", "feature")["feature"].text())
+        case "has_category":
+            fields = place.fields("type", "feature", "category")
+            return HasCategory(fields["feature"].text(), fields["category"].text())
+        case "last_action_is":
+            fields = place.fields("type", "action", "deciding")
+            deciding = fields["deciding"].items(_Place.text)
+            return LastActionIs(fields["action"].text(), deciding)
+        case unknown:
+            raise DocumentError(f"{place.path} has the unknown type {unknown!r}.")

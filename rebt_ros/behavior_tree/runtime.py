@@ -1,0 +1,237 @@
+"""The behavior tree as a py_trees tree that can be ticked.
+
+The only module of the core that knows py_trees.  Every runtime holds its own state and history:
+py_trees' blackboard, which is one for the whole process, is not used.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import py_trees
+from py_trees.common import Status
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.wording import Wording
+from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, LastActionIs, Literal, Threshold
+
+
+class Commander(Protocol):
+    """What carries out the actions of a tree."""
+
+    def update(self, action: nodes.Action) -> Status:
+        """Called at each tick that reaches the action: whether it runs, succeeded or failed."""
+
+    def halt(self, action: nodes.Action) -> None:
+        """Called when an action that is running is interrupted."""
+
+
+class SucceedAtOnce:
+    """A commander whose actions are done once they are chosen."""
+
+    def update(self, action: nodes.Action) -> Status:
+        """Success."""
+        return Status.SUCCESS
+
+    def halt(self, action: nodes.Action) -> None:
+        """Never has anything to interrupt."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """What one tick did."""
+
+    status: Status
+    actions: tuple[nodes.Action, ...]
+    """Actions that were ticked, in order."""
+    tip: str
+    """What the deepest node that decided says; empty where none did."""
+
+
+def executable(tree: nodes.Node) -> nodes.Node:
+    """The tree as a robot runs it: a root Parallel becomes a memoryless Selector.
+
+    A Parallel fails, and halts the actions that run, as soon as one child fails; under a root
+    Parallel all rules but one fail at every tick.
+    """
+    return nodes.Selector(tree.children) if isinstance(tree, nodes.Parallel) else tree
+
+
+class TreeRuntime:
+    """A learned tree, ready to be ticked.
+
+    Args:
+        learned: The tree and its features.
+        commander: Carries out the actions.
+        tree: What to run instead of ``learned.tree``, such as its `executable` form.
+    """
+
+    def __init__(
+        self,
+        learned: LearnedTree,
+        commander: Commander | None = None,
+        tree: nodes.Node | None = None,
+    ) -> None:
+        self.learned = learned
+        self.histories = {action.channel: ActionHistory() for action in learned.actions}
+        """LAT of each channel: the actions that the tree has taken, and what is added to them."""
+        self._commander = SucceedAtOnce() if commander is None else commander
+        self._state: Sequence[float] = ()
+        self._ticked: list[nodes.Action] = []
+        self._wording = Wording(learned)
+        self._place = {feature.name: place for place, feature in enumerate(learned.features)}
+        # The learner refuses demonstrations of several channels, so there is one history.
+        self._history = next(iter(self.histories.values()))
+        self._behaviours = self._build(learned.tree if tree is None else tree)
+        self.root = self._behaviours[0]
+
+    def tick(self, state: Sequence[float]) -> Tick:
+        """Ticks the tree once.
+
+        Args:
+            state: Encoded values in the order of the learned tree's features (see `StateEncoder`).
+        """
+        self._state = state
+        self._ticked.clear()
+        self.root.tick_once()
+        # Afterwards, so that all conditions of one tick see the same history.
+        for action in self._ticked:
+            self.histories[action.channel].take(action.label)
+        tip = self.root.tip()
+        return Tick(self.root.status, tuple(self._ticked), tip.name if tip else "")
+
+    def halt(self) -> None:
+        """Interrupts whatever runs; the next tick starts afresh, with the same histories."""
+        self.root.stop(Status.INVALID)
+
+    def snapshot(self) -> tuple[str, ...]:
+        """The status name of every node, each parent before its children."""
+        return tuple(behaviour.status.name for behaviour in self._behaviours)
+
+    def _build(self, node: nodes.Node) -> list[py_trees.behaviour.Behaviour]:
+        """The behaviours of the node and all its descendants, each parent before its children."""
+        families = [self._build(child) for child in nodes.children(node)]
+        own = self._behaviour(self._wording.node(node), node, [family[0] for family in families])
+        return [own, *(one for family in families for one in family)]
+
+    def _behaviour(
+        self, name: str, node: nodes.Node, children: list[py_trees.behaviour.Behaviour]
+    ) -> py_trees.behaviour.Behaviour:
+        match node:
+            case nodes.Condition(literal=literal):
+                return _Test(name, self._test(literal))
+            case nodes.Action():
+                return _Command(name, node, self._commander, self._ticked)
+            case nodes.Inverter():
+                return py_trees.decorators.Inverter(name=name, child=children[0])
+            case nodes.Sequence(memory=memory):
+                return py_trees.composites.Sequence(name, memory, children)
+            case nodes.Selector(memory=memory):
+                return py_trees.composites.Selector(name, memory, children)
+            case nodes.ParallelSelector():
+                return py_trees.composites.Selector(name, False, children)
+            case nodes.Parallel():
+                policy = py_trees.common.ParallelPolicy.SuccessOnAll(synchronise=False)
+                return py_trees.composites.Parallel(name, policy, children)
+            case nodes.Repeater():
+                sequence = py_trees.composites.Sequence(name, True, children)
+                return py_trees.decorators.Repeat(name=name, child=sequence, num_success=-1)
+
+    def _test(self, literal: Literal) -> Callable[[], bool]:
+        holds = self._test_condition(literal.condition)
+        return holds if literal.positive else lambda: not holds()
+
+    def _test_condition(self, condition: Condition) -> Callable[[], bool]:
+        if isinstance(condition, LastActionIs):
+            action, deciding, history = condition.action, condition.deciding, self._history
+            return lambda: history.before(*deciding) == action
+        place = self._place[condition.feature]
+        match condition:
+            case Threshold(value=value):
+                return lambda: self._state[place] <= value
+            case IsTrue():
+                return lambda: self._state[place] == 1
+            case HasCategory(feature=feature, category=name):
+                code = self.learned.features[place].categories.index(name)
+                return lambda: self._state[place] == code
+
+
+class _Test(py_trees.behaviour.Behaviour):
+    """A condition: succeeds or fails at once."""
+
+    def __init__(self, name: str, holds: Callable[[], bool]) -> None:
+        super().__init__(name)
+        self._holds = holds
+
+    def update(self) -> Status:
+        return Status.SUCCESS if self._holds() else Status.FAILURE
+
+
+class _Command(py_trees.behaviour.Behaviour):
+    """An action, carried out by the commander."""
+
+    def __init__(
+        self, name: str, action: nodes.Action, commander: Commander, ticked: list[nodes.Action]
+    ) -> None:
+        super().__init__(name)
+        self._action = action
+        self._commander = commander
+        self._ticked = ticked
+
+    def update(self) -> Status:
+        self._ticked.append(self._action)
+        return self._commander.update(self._action)
+
+    def terminate(self, new_status: Status) -> None:
+        # py_trees may terminate a behaviour twice; only a running action is interrupted.
+        if new_status is Status.INVALID and self.status is Status.RUNNING:
+            self._commander.halt(self._action)
+
+
+class StateEncoder:
+    """Turns the latest messages of the state topics into the state that a tree reads.
+
+    Args:
+        features: The learned tree's features.
+        default_topic: Topic of features that came from a table, in their order there.
+    """
+
+    def __init__(self, features: Sequence[Feature], default_topic: str = "state") -> None:
+        self._sources = [
+            (feature, feature.topic or default_topic, place if feature.index is None else feature.index)
+            for place, feature in enumerate(features)
+        ]
+        self._codes = [
+            {float(name): float(code) for code, name in enumerate(feature.categories) if _number(name)}
+            for feature in features
+        ]
+        self.topics: dict[str, int] = {}
+        """The least number of values that each topic must send."""
+        for _, topic, index in self._sources:
+            self.topics[topic] = max(self.topics.get(topic, 0), index + 1)
+
+    def encode(self, latest: Mapping[str, Sequence[float]]) -> list[float]:
+        """The values of all features; NaN for a category that was never shown.
+
+        Args:
+            latest: The newest message of every topic in `topics`, of at least that length.
+        """
+        state = [latest[topic][index] for _, topic, index in self._sources]
+        for place, (feature, _, _) in enumerate(self._sources):
+            if feature.kind is FeatureKind.CATEGORICAL:
+                state[place] = self._codes[place].get(state[place], math.nan)
+        return state
+
+
+def _number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

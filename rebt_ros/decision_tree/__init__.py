@@ -1,0 +1,1 @@
+"""Decision trees: trained by scikit-learn, then carried on as plain data."""

@@ -1,0 +1,111 @@
+"""The table as the matrix that scikit-learn learns from, and back: what each column asks.
+
+A numeric feature is one column, a binary one as well; a categorical feature and LAT have one
+column for each category and action (one-hot).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rebt_ros.arrays import Float32Array
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import (
+    KNOWN,
+    Condition,
+    HasCategory,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    Threshold,
+)
+
+#: Stands for a missing number: larger than all that are not, as ``missing <= x`` is false.
+_MISSING = float(np.finfo(np.float32).max)
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """Column of a numeric feature."""
+
+    feature: str
+
+    def at_most(self, threshold: float) -> Literal:
+        """The literal that holds where the column is at most `threshold`."""
+        # No value lies between the largest one that is accepted (1e38) and the missing ones.
+        beyond = threshold > _MISSING / 3
+        return Literal(Threshold(self.feature, KNOWN if beyond else exact_threshold(threshold)))
+
+
+@dataclass(frozen=True, slots=True)
+class Indicator:
+    """Column that is 1 where a condition holds and 0 elsewhere."""
+
+    condition: Condition
+
+    def at_most(self, threshold: float) -> Literal:
+        """The literal that holds where the column is at most `threshold`, which is about 0.5."""
+        return ~Literal(self.condition)
+
+
+def columns(table: DemonstrationTable, last_action: bool) -> tuple[Number | Indicator, ...]:
+    """What each column of the encoded table asks."""
+    asked: list[Number | Indicator] = []
+    for feature in table.features:
+        if feature.kind is FeatureKind.NUMERIC:
+            asked.append(Number(feature.name))
+        elif feature.kind is FeatureKind.BINARY:
+            asked.append(Indicator(IsTrue(feature.name)))
+        else:
+            asked += [Indicator(HasCategory(feature.name, one)) for one in feature.categories]
+    if last_action:
+        asked += [Indicator(LastActionIs(action)) for action in table.actions]
+    return tuple(asked)
+
+
+def encode(table: DemonstrationTable, last_action: bool) -> Float32Array:
+    """The matrix to train on and predict from, shape (rows, columns)."""
+    blocks: list[Float32Array] = []
+    for index, feature in enumerate(table.features):
+        values = table.states[:, index]
+        if feature.kind is FeatureKind.NUMERIC:
+            known = np.where(np.isnan(values), _MISSING, values)
+            blocks.append(known.astype(np.float32)[:, np.newaxis])
+        elif feature.kind is FeatureKind.BINARY:
+            blocks.append((values == 1).astype(np.float32)[:, np.newaxis])
+        else:
+            blocks.append(_one_hot(values, len(feature.categories)))
+    if last_action:
+        blocks.append(_one_hot(table.last, len(table.actions)))
+    if not blocks:
+        return np.empty((len(table), 0), dtype=np.float32)
+    return np.hstack(blocks)
+
+
+def exact_threshold(threshold: float) -> float:
+    """The double-precision threshold that decides as scikit-learn does.
+
+    scikit-learn asks ``float32(x) <= threshold``.  The result t has ``x <= t`` in exactly the same
+    cases for every double-precision x: it is the largest double that rounds to a single-precision
+    number not above `threshold`.
+
+    >>> bool(np.float32(0.1) <= 0.1), 0.1 <= exact_threshold(0.1)
+    (False, False)
+    """
+    with np.errstate(over="ignore"):
+        below = np.float32(threshold)
+        if float(below) > threshold:
+            below = np.nextafter(below, np.float32(-np.inf))
+        above = np.nextafter(below, np.float32(np.inf))
+    # Both neighbours have 24 significant bits, so their middle is exact in double precision.
+    # Rounding takes a tie to the neighbour whose last bit is even.
+    middle = (float(below) + float(above)) / 2
+    tie_goes_down = int(below.view(np.uint32)) % 2 == 0
+    return middle if tie_goes_down else float(np.nextafter(middle, -np.inf))
+
+
+def _one_hot(codes: np.ndarray, count: int) -> Float32Array:
+    return (codes[:, np.newaxis] == np.arange(count)).astype(np.float32)

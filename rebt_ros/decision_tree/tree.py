@@ -1,0 +1,62 @@
+"""The decision tree as immutable data, in terms of conditions instead of encoded columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rebt_ros.behavior_tree.nodes import Action
+from rebt_ros.logic.conditions import Condition, Literal
+from rebt_ros.logic.dnf import Conjunction
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """Where a decision path ends."""
+
+    distribution: tuple[int, ...]
+    """Training rows of each action, in the order of the tree's actions."""
+
+    @property
+    def most_probable(self) -> int:
+        """Position of the most frequent action; the first one of several."""
+        return self.distribution.index(max(self.distribution))
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """A test on the way to a leaf."""
+
+    condition: Condition
+    if_true: DecisionNode
+    if_false: DecisionNode
+
+
+DecisionNode: TypeAlias = Leaf | Split
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionTree:
+    """A policy: every state leads to one leaf."""
+
+    actions: tuple[Action, ...]
+    root: DecisionNode
+
+    def paths(self) -> Iterator[tuple[Conjunction, Leaf]]:
+        """Every leaf with the conjunction of the literals that lead to it, from left to right.
+
+        A condition that is tested again on a path, as thresholds at the edge of single precision
+        can be, stands in its conjunction once; a path that contradicts itself is left out.
+        """
+        waiting: list[tuple[tuple[Literal, ...], DecisionNode]] = [((), self.root)]
+        while waiting:
+            literals, node = waiting.pop()
+            if isinstance(node, Leaf):
+                yield Conjunction(literals), node
+                continue
+            holds = Literal(node.condition)
+            for literal, branch in ((~holds, node.if_false), (holds, node.if_true)):
+                if ~literal not in literals:
+                    known = literal in literals
+                    waiting.append((literals if known else (*literals, literal), branch))
