@@ -85,7 +85,7 @@ Progress = Callable[[str, float], None]
 
 def learn(
     demonstrations: Sequence[Demonstration],
-    options: LearnOptions = LearnOptions(),  # noqa: B008 -- immutable
+    options: LearnOptions = LearnOptions(),
     declared: Mapping[str, FeatureKind] | None = None,
 ) -> LearnedTree:
     """Learns one behavior tree from all demonstrations.
@@ -119,7 +119,7 @@ def only_channel(tables: Sequence[DemonstrationTable]) -> DemonstrationTable:
 
 def learn_from(
     table: DemonstrationTable,
-    options: LearnOptions = LearnOptions(),  # noqa: B008 -- immutable
+    options: LearnOptions = LearnOptions(),
     progress: Progress = lambda stage, share: None,
 ) -> Learning:
     """Learns one behavior tree from a table; see `learn`."""
@@ -142,7 +142,9 @@ def learn_from(
         if not options.refit or not held_out.any()
         else _fit(table, options, best.trained.uses_last_action)
     )
-    mismatches = int(np.sum(evaluation.teacher_forced_choices(tree, table) != trained.predict(table)))
+    mismatches = int(
+        np.sum(evaluation.teacher_forced_choices(tree, table) != trained.predict(table))
+    )
     learned = LearnedTree(
         table.features,
         evaluation.actions_of(table),

@@ -75,22 +75,21 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> Rep
 
 
 def _disagreements(table: DemonstrationTable, chosen: IntArray) -> tuple[Disagreement, ...]:
-    first = {int(one): int(np.argmax(table.demonstration == one)) for one in table.demonstration}
+    rows = np.flatnonzero(chosen != table.chosen)
+    first = np.searchsorted(table.demonstration, table.demonstration[rows])
     return tuple(
         Disagreement(
             table.demonstrations[table.demonstration[row]],
-            int(row) - first[int(table.demonstration[row])],
-            float(table.stamps[row] - table.stamps[first[int(table.demonstration[row])]]) / 1e9,
+            int(row - start),
+            float(table.stamps[row] - table.stamps[start]) / 1e9,
             table.actions[table.chosen[row]],
             None if chosen[row] == NO_ACTION else table.actions[chosen[row]],
         )
-        for row in np.flatnonzero(chosen != table.chosen)
+        for row, start in zip(rows, first, strict=True)
     )
 
 
-def _table_for(
-    learned: LearnedTree, demonstrations: Sequence[Demonstration]
-) -> DemonstrationTable:
+def _table_for(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> DemonstrationTable:
     """The rows as the tree reads them: its features, its channel, and its actions known."""
     channel = learned.actions[0].channel
     tables = {table.channel: table for table in tabulate(demonstrations)}

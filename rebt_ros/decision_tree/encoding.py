@@ -67,7 +67,11 @@ def columns(table: DemonstrationTable, last_action: bool) -> tuple[Number | Indi
 
 
 def encode(table: DemonstrationTable, last_action: bool) -> Float32Array:
-    """The matrix to train on and predict from, shape (rows, columns)."""
+    """The matrix to train on and predict from, shape (rows, columns).
+
+    Where there is nothing to learn from, it has one column that tells nothing, as scikit-learn
+    wants at least one.
+    """
     blocks: list[Float32Array] = []
     for index, feature in enumerate(table.features):
         values = table.states[:, index]
@@ -81,7 +85,7 @@ def encode(table: DemonstrationTable, last_action: bool) -> Float32Array:
     if last_action:
         blocks.append(_one_hot(table.last, len(table.actions)))
     if not blocks:
-        return np.empty((len(table), 0), dtype=np.float32)
+        return np.zeros((len(table), 1), dtype=np.float32)
     return np.hstack(blocks)
 
 

@@ -5,6 +5,7 @@ The only module that knows scikit-learn.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,11 +53,10 @@ def train(
     classifier = DecisionTreeClassifier(
         criterion="gini", max_depth=max_depth, ccp_alpha=ccp_alpha, random_state=random_state
     )
-    matrix = encode(table, last_action)
-    if matrix.shape[1] == 0:
-        # scikit-learn wants a column, even one that tells nothing.
-        matrix = np.zeros((len(table), 1), dtype=np.float32)
-    classifier.fit(matrix, table.chosen)
+    with warnings.catch_warnings():
+        # Actions are codes here; that there are many does not make this a regression.
+        warnings.filterwarnings("ignore", message="The number of unique classes")
+        classifier.fit(encode(table, last_action), table.chosen)
     actions = tuple(Action(label, table.channel) for label in table.actions)
     root = _as_data(classifier, columns(table, last_action), len(actions))
     return TrainedTree(DecisionTree(actions, root), last_action, classifier)

@@ -30,7 +30,7 @@ def minimize(dnf: Dnf, dont_care: Dnf = FALSE) -> Dnf:
 
     Returns:
         A DNF equal to `dnf` on every assignment of its conditions outside `dont_care`.  Literals
-        keep the order in which their conditions first occur; conjunctions are sorted.
+        stand in the order in which their conditions first occur, and so do conjunctions.
     """
     if dnf.is_true or dnf == FALSE:
         # Espresso has no cubes of zero inputs.
@@ -39,8 +39,13 @@ def minimize(dnf: Dnf, dont_care: Dnf = FALSE) -> Dnf:
     cover = [(_cube(conjunction, vocabulary), (_ON,)) for conjunction in dnf]
     cover += [(_cube(conjunction, vocabulary), (_DONT_CARE,)) for conjunction in dont_care]
     minimized = espresso(len(vocabulary), 1, cover, FTYPE | DTYPE)
-    cubes = sorted((inputs for inputs, _ in minimized), reverse=True)
+    cubes = sorted((inputs for inputs, _ in minimized), key=_reading_order)
     return Dnf(tuple(_conjunction(cube, vocabulary) for cube in cubes))
+
+
+def _reading_order(cube: _Cube) -> list[int]:
+    """Cubes that test the first conditions of the vocabulary come first, positive ones before."""
+    return [(_POSITIVE, _NEGATIVE, _ABSENT).index(value) for value in cube]
 
 
 def _cube(conjunction: Conjunction, vocabulary: tuple[Condition, ...]) -> _Cube:

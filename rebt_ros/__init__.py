@@ -1,0 +1,45 @@
+"""Learn a robot's behavior tree from demonstrations, while the robot runs or from files.
+
+`learn` and `replay` are what most scripts need; `LearnOptions` and `InputOptions` hold their
+options.  They are imported when first used, so that nodes which do not learn start quickly.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
+    from rebt_ros.errors import RebtError
+    from rebt_ros.offline import learn, replay
+    from rebt_ros.pipeline import LastActionUse, LearnOptions
+    from rebt_ros.storage.inputs import InputOptions
+
+__all__ = [
+    "InputOptions",
+    "LastActionUse",
+    "LearnOptions",
+    "LearnedTree",
+    "RebtError",
+    "Root",
+    "learn",
+    "replay",
+]
+
+_HOMES = {
+    "InputOptions": "rebt_ros.storage.inputs",
+    "LastActionUse": "rebt_ros.pipeline",
+    "LearnOptions": "rebt_ros.pipeline",
+    "LearnedTree": "rebt_ros.behavior_tree.learned_tree",
+    "RebtError": "rebt_ros.errors",
+    "Root": "rebt_ros.behavior_tree.learned_tree",
+    "learn": "rebt_ros.offline",
+    "replay": "rebt_ros.offline",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)

@@ -1,0 +1,1 @@
+"""The executables that are not nodes: they read arguments, print, and exit."""

@@ -1,0 +1,81 @@
+"""``ros2 run rebt_ros replay TREE INPUT...``: runs a tree over recorded demonstrations."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rebt_ros import offline
+from rebt_ros.commands.shell import add_input_options, input_options, run
+from rebt_ros.replay import Disagreement, Replay
+
+#: Recordings whose rows lie closer have no clock, as CSV tables (seconds).
+_NO_CLOCK = 1e-3
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="replay",
+        description="Runs a learned tree over recorded demonstrations, as fast as it can, and "
+        "shows where it would have done something else.",
+    )
+    parser.add_argument("tree", type=Path, metavar="TREE", help="tree.json of a learned tree")
+    add_input_options(parser)
+    parser.add_argument(
+        "--disagreements",
+        type=int,
+        default=10,
+        metavar="N",
+        help="how many disagreements to list (default: %(default)s)",
+    )
+    parsed = parser.parse_args(arguments)
+    run(lambda: _replay(parsed), "replay")
+
+
+def _replay(parsed: argparse.Namespace) -> None:
+    result = offline.replay(parsed.tree, parsed.inputs, reading=input_options(parsed))
+    print(f"{result.rows} rows")
+    print(f"  agreement, own history    {result.own_history_agreement:.2%}")
+    print(f"  agreement, teacher-forced {result.teacher_forced_agreement:.2%}")
+    print()
+    print("\n".join(_confusion_table(result)))
+    listed = result.disagreements[: max(parsed.disagreements, 0)]
+    if listed:
+        print()
+        print(f"First {len(listed)} of {len(result.disagreements)} disagreements:")
+        print("\n".join(_disagreement_table(listed)))
+
+
+def _confusion_table(result: Replay) -> Iterator[str]:
+    """Rows by what was shown; no column for "none" where the tree always chose."""
+    silent = result.confusion[:, -1].any()
+    chosen = (*result.actions, "(none)") if silent else result.actions
+    cells = [["shown \\ chosen", *chosen]]
+    for label, counts in zip(result.actions, result.confusion.tolist(), strict=True):
+        if any(counts):
+            cells.append([label, *(str(count or "·") for count in counts[: len(chosen)])])
+    return _aligned(cells)
+
+
+def _disagreement_table(listed: Sequence[Disagreement]) -> Iterator[str]:
+    has_clock = any(one.seconds >= _NO_CLOCK for one in listed)
+    cells = [["demonstration", "row", *(["seconds"] if has_clock else []), "shown", "chosen"]]
+    for one in listed:
+        seconds = [f"{one.seconds:.3f}"] if has_clock else []
+        row = [one.demonstration, str(one.row), *seconds, one.shown, one.chosen or "(none)"]
+        cells.append(row)
+    return _aligned(cells)
+
+
+def _aligned(cells: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Lines in which columns line up: the first to the left, the others to the right."""
+    widths = [max(len(row[place]) for row in cells) for place in range(len(cells[0]))]
+    for first, *others in cells:
+        right = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
+        yield "  ".join((f"{first:<{widths[0]}}", *right))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,95 @@
+"""What all commands share: options of inputs, colour, errors as one sentence."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from rebt_ros.demonstration.builder import StateTopic
+from rebt_ros.errors import RebtError
+from rebt_ros.storage.inputs import InputOptions
+
+#: Exit codes of a failure that the user can mend, and of Ctrl-C (128 + SIGINT).
+_FAILED, _INTERRUPTED = 1, 130
+
+
+def run(command: Callable[[], None], name: str) -> None:
+    """Runs a command; a `RebtError` becomes one sentence and exit code 1."""
+    try:
+        command()
+        sys.stdout.flush()
+    except RebtError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        sys.exit(_FAILED)
+    except KeyboardInterrupt:
+        sys.exit(_INTERRUPTED)
+    except BrokenPipeError:
+        # The reader, such as `head`, has seen enough; nothing may be flushed to it at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def use_color() -> bool:
+    """Whether the terminal shows colours and its user wants them (https://no-color.org)."""
+    return sys.stdout.isatty() and "NO_COLOR" not in os.environ
+
+
+def add_input_options(parser: argparse.ArgumentParser) -> None:
+    """Adds INPUT... and how to read it."""
+    parser.add_argument(
+        "inputs",
+        nargs="+",
+        type=Path,
+        metavar="INPUT",
+        help="a rosbag2 bag (directory, .mcap or .db3), a recording of the recorder or a "
+        "directory of them, or a CSV table",
+    )
+    tables = parser.add_argument_group("CSV tables")
+    tables.add_argument("--label", metavar="COLUMN", help="column of the action (default: last)")
+    tables.add_argument(
+        "--no-header", action="store_true", help="the first line is a row; columns are x0, x1, …"
+    )
+    bags = parser.add_argument_group("bags")
+    bags.add_argument(
+        "--state-topic",
+        action="append",
+        default=[],
+        metavar="TOPIC[:FIELD,…]",
+        help="Float64MultiArray topic, with the names of its values; repeatable (default: the "
+        "only one, named by its layout's labels)",
+    )
+    bags.add_argument(
+        "--action-topic",
+        action="append",
+        default=[],
+        metavar="TOPIC",
+        help="String topic of actions; repeatable (default: the only one)",
+    )
+    bags.add_argument(
+        "--sample-rate",
+        type=float,
+        metavar="HZ",
+        help="rows per second while an action holds (default: one row per action message)",
+    )
+    bags.add_argument(
+        "--skip-bad", action="store_true", help="leave out malformed messages instead of refusing"
+    )
+
+
+def input_options(arguments: argparse.Namespace) -> InputOptions:
+    """The options that `add_input_options` added."""
+    return InputOptions(
+        label=arguments.label,
+        header=not arguments.no_header,
+        state_topics=tuple(map(_state_topic, arguments.state_topic)),
+        action_topics=tuple(arguments.action_topic),
+        sample_rate=arguments.sample_rate,
+        skip_bad=arguments.skip_bad,
+    )
+
+
+def _state_topic(text: str) -> StateTopic:
+    name, _, fields = text.partition(":")
+    return StateTopic(name, tuple(fields.split(",")) if fields else ())

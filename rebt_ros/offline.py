@@ -1,0 +1,159 @@
+"""Learning from files and replaying over files: the Python side of the commands."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import platform
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rebt_ros import pipeline
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.dot import render_dot
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.svg import render_svg
+from rebt_ros.behavior_tree.text import render_text
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.pipeline import Learning, LearnOptions, Progress
+from rebt_ros.replay import Replay
+from rebt_ros.replay import replay as replay_demonstrations
+from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.inputs import InputOptions, load
+from rebt_ros.storage.tree_file import read_tree, write_tree
+
+#: Packages whose versions can change a result.
+_DECIDING_PACKAGES = ("numpy", "scikit-learn", "pyeda", "py_trees")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class OfflineLearning:
+    """A tree learned from files."""
+
+    learning: Learning
+    notes: tuple[str, ...]
+    """What a person should know about the inputs."""
+
+    @property
+    def learned(self) -> LearnedTree:
+        """The value of the behavior tree document."""
+        return self.learning.learned
+
+
+def learn(
+    inputs: Sequence[str | Path],
+    *,
+    out: str | Path | None = None,
+    options: LearnOptions | None = None,
+    reading: InputOptions | None = None,
+    declared: Mapping[str, FeatureKind] | None = None,
+    progress: Progress = lambda stage, share: None,
+) -> OfflineLearning:
+    """Learns a behavior tree from bags, recordings and CSV tables.
+
+    Args:
+        inputs: Each one or more demonstrations, oldest first.
+        out: Directory to write to: tree.json, summary.json, tree.svg, tree.dot and tree.txt.
+        options: How to learn.
+        reading: How to read the inputs, such as which column of a CSV table is the action.
+        declared: Kinds of features by name, where they should not be detected.
+        progress: Told what is being done and which share of the work is behind.
+
+    Raises:
+        RebtError: An input cannot be used or an option makes no sense; nothing was written.
+    """
+    options = options or LearnOptions()
+    progress("reading", 0.0)
+    loaded = load([Path(one) for one in inputs], reading or InputOptions())
+    table = pipeline.only_channel(tabulate(loaded.demonstrations, declared))
+    notes = (*loaded.notes, *_doubts(table))
+    result = OfflineLearning(pipeline.learn_from(table, options, progress), notes)
+    if out is not None:
+        _write(Path(out), result, [str(one) for one in inputs], options)
+    return result
+
+
+def replay(
+    tree: LearnedTree | str | Path,
+    inputs: Sequence[str | Path],
+    *,
+    reading: InputOptions | None = None,
+) -> Replay:
+    """Runs a tree over the rows of bags, recordings and CSV tables.
+
+    Args:
+        tree: A learned tree, or the file of one.
+        inputs: Each one or more demonstrations.
+        reading: How to read the inputs.
+
+    Raises:
+        RebtError: The tree or an input cannot be used, or they do not fit each other.
+    """
+    learned = tree if isinstance(tree, LearnedTree) else read_tree(Path(tree))
+    loaded = load([Path(one) for one in inputs], reading or InputOptions())
+    return replay_demonstrations(learned, loaded.demonstrations)
+
+
+def _doubts(table: DemonstrationTable) -> Iterator[str]:
+    if len(table.actions) * 2 > len(table) > 2:
+        yield (
+            f"{len(table.actions)} different actions in {len(table)} rows do not look like "
+            f"actions ({', '.join(table.actions[:3])}, …); is another column or topic meant"
+        )
+
+
+def _write(
+    directory: Path, result: OfflineLearning, inputs: Sequence[str], options: LearnOptions
+) -> None:
+    learned = result.learned
+    write_tree(directory / "tree.json", learned)
+    write_text_atomically(directory / "tree.svg", render_svg(learned))
+    write_text_atomically(directory / "tree.dot", render_dot(learned))
+    write_text_atomically(directory / "tree.txt", render_text(learned))
+    summary = summarize(result.learning) | {
+        "inputs": list(inputs),
+        "notes": list(result.notes),
+        "random_state": options.random_state,
+        "test_fraction": options.test_fraction,
+        "refit": options.refit,
+        "versions": _versions(),
+    }
+    text = json.dumps(summary, indent=2, ensure_ascii=False)
+    write_text_atomically(directory / "summary.json", text + "\n")
+
+
+def summarize(learning: Learning) -> dict[str, Any]:
+    """The figures of a learned tree, as written to summary.json."""
+    learned, provenance = learning.learned, learning.learned.provenance
+    figures = provenance.figures
+    return {
+        "rows": provenance.rows,
+        "demonstrations": provenance.demonstrations,
+        "features": [feature.name for feature in learned.features],
+        "actions": [action.label for action in learned.actions],
+        "nodes": nodes.size(learned.tree),
+        "depth": nodes.depth(learned.tree),
+        "decision_tree_leaves": sum(1 for _ in learning.decision_tree.tree.paths()),
+        "fidelity_mismatches": figures.fidelity_mismatches,
+        "held_out_rows": figures.held_out_rows,
+        "teacher_forced_agreement": figures.teacher_forced_agreement,
+        "own_history_agreement": figures.own_history_agreement,
+        "uses_last_action": provenance.uses_last_action,
+        "root": provenance.root.value,
+        "delta": provenance.delta,
+        "max_depth": provenance.max_depth,
+        "ccp_alpha": provenance.ccp_alpha,
+    }
+
+
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version()}
+    for package in _DECIDING_PACKAGES:
+        try:
+            versions[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            versions[package] = "unknown"
+    return versions

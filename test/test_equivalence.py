@@ -1,0 +1,224 @@
+"""The behavior tree chooses what the decision tree predicts, wherever a state can lie.
+
+The states tested are all feasible combinations of the decision tree's conditions, not only the
+rows that were learned from: every numeric feature takes a value between each two neighbouring
+thresholds, on each threshold and just beyond it, or is missing; LAT takes every action, or none.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
+from rebt_ros.algorithms.rules import delta_close
+from rebt_ros.arrays import BoolArray, IntArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.document import dumps, loads
+from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
+from rebt_ros.behavior_tree.prediction import States, choose, last_action_column, triggered
+from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.decision_tree.training import TrainedTree, train
+from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
+from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Threshold
+
+FEATURES = (
+    Feature("distance"),
+    Feature("battery"),
+    Feature("docked", FeatureKind.BINARY),
+    Feature("kind", FeatureKind.CATEGORICAL, ("box", "cup", "tool")),
+)
+LABELS = ("go", "grasp", "turn", "wait")
+
+#: Few distinct values make deep trees with several thresholds; tenths are not exact in binary.
+numbers = st.one_of(st.integers(0, 6).map(lambda n: n / 10), st.floats(-2, 2), st.just(math.nan))
+rows = st.tuples(
+    numbers,
+    numbers,
+    st.sampled_from((0.0, 1.0)),
+    st.sampled_from((0.0, 1.0, 2.0, math.nan)),
+    st.sampled_from(range(len(LABELS))),
+    st.booleans(),
+)
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> DemonstrationTable:
+    drawn = draw(st.lists(rows, min_size=2, max_size=24))
+    return DemonstrationTable(
+        channel="action",
+        features=FEATURES,
+        states=np.array([row[:4] for row in drawn]),
+        actions=LABELS,
+        chosen=np.array([row[4] for row in drawn], dtype=np.int64),
+        demonstrations=tuple(f"demonstration {n}" for n in range(len(drawn) + 1)),
+        demonstration=np.cumsum([row[5] for row in drawn]).astype(np.int64),
+        stamps=np.arange(len(drawn)),
+    )
+
+
+def feasible_states(tree: DecisionTree, table: DemonstrationTable) -> DemonstrationTable:
+    """A table with one row for every feasible combination of the tree's conditions."""
+    thresholds: dict[str, set[float]] = {feature.name: set() for feature in FEATURES}
+    waiting: list[DecisionNode] = [tree.root]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Split):
+            waiting += [node.if_true, node.if_false]
+            if isinstance(node.condition, Threshold) and abs(node.condition.value) < 1e30:
+                thresholds[node.condition.feature].add(node.condition.value)
+    candidates = [
+        *(
+            [-1e30, math.nan]
+            + [
+                float(value)
+                for threshold in sorted(thresholds[name])
+                for value in (threshold, np.nextafter(threshold, np.inf))
+            ]
+            for name in ("distance", "battery")
+        ),
+        [0.0, 1.0],
+        [0.0, 1.0, 2.0, math.nan],
+        [float(code) for code in range(NO_ACTION, len(LABELS))],
+    ]
+    combinations = np.array(list(itertools.product(*candidates)))
+    feasible = replace(
+        table,
+        states=combinations[:, :4],
+        chosen=np.zeros(len(combinations), dtype=np.int64),
+        demonstration=np.zeros(len(combinations), dtype=np.int64),
+        stamps=np.arange(len(combinations)),
+    )
+    return with_last(feasible, combinations[:, 4].astype(np.int64))
+
+
+def as_learned(tree: nodes.Node, trained: TrainedTree) -> LearnedTree:
+    figures = Figures(0, None, None, 0)
+    provenance = Provenance(1, 1, 0.0, None, 0.0, Root.SELECTOR, trained.uses_last_action, figures)
+    return LearnedTree(FEATURES, trained.tree.actions, tree, provenance)
+
+
+def predicted_by_tree(
+    tree: nodes.Node, trained: TrainedTree, table: DemonstrationTable
+) -> list[int]:
+    column = last_action_column(table.actions, table.last)
+    states = States(FEATURES, table.states, column)
+    return choose(tree, trained.tree.actions, states).tolist()
+
+
+class OneLastAction(ActionHistory):
+    """LAT is the same from the side of every rule, as in a decision tree's column."""
+
+    last: str | None = None
+
+    def before(self, *deciding: str) -> str | None:
+        return self.last
+
+
+def ticked_by_runtime(learned: LearnedTree, table: DemonstrationTable) -> list[list[str]]:
+    """What one tick takes in each row."""
+    history = OneLastAction()
+    runtime = TreeRuntime(learned, histories={"action": history})
+    ticked = []
+    for state, last in zip(table.states.tolist(), table.last.tolist(), strict=True):
+        history.last = None if last == NO_ACTION else LABELS[last]
+        ticked.append([action.label for action in runtime.tick(state).actions])
+    return ticked
+
+
+def with_last(table: DemonstrationTable, last: IntArray) -> DemonstrationTable:
+    """The table with the given LAT column instead of the one that follows from its actions."""
+    object.__setattr__(table, "last", last)
+    return table
+
+
+def every(table: DemonstrationTable, step: int) -> DemonstrationTable:
+    part = table.where(np.arange(len(table)) % step == 0)
+    return with_last(part, table.last[::step])
+
+
+@pytest.mark.parametrize("root", Root)
+@pytest.mark.parametrize("last_action", [False, True], ids=["without LAT", "with LAT"])
+@settings(max_examples=40, deadline=None)
+@given(table=tables())
+def test_the_behavior_tree_chooses_what_the_decision_tree_predicts_at_every_feasible_state(
+    root: Root, last_action: bool, table: DemonstrationTable
+) -> None:
+    trained = train(table, last_action=last_action, max_depth=4)
+    learned = as_learned(re_bt_espresso(trained.tree, delta=0.0, root=root), trained)
+    feasible = feasible_states(trained.tree, table)
+    expected = trained.predict(feasible)
+    assert predicted_by_tree(learned.tree, trained, feasible) == expected.tolist()
+    # Ticking is slow: a spread of the states, a different one for each table.
+    step = 1 + len(feasible) // 300
+    wanted = [[LABELS[code]] for code in expected[::step]]
+    assert ticked_by_runtime(learned, every(feasible, step)) == wanted
+    assert ticked_by_runtime(loads(dumps(learned)), every(feasible, step)) == wanted
+
+
+@settings(max_examples=40, deadline=None)
+@given(table=tables())
+def test_the_baseline_chooses_what_the_decision_tree_predicts_at_every_feasible_state(
+    table: DemonstrationTable,
+) -> None:
+    trained = train(table, last_action=True, max_depth=4)
+    feasible = feasible_states(trained.tree, table)
+    tree = bt_espresso(trained.tree)
+    assert predicted_by_tree(tree, trained, feasible) == trained.predict(feasible).tolist()
+
+
+@settings(max_examples=40, deadline=None)
+@given(table=tables(), delta=st.sampled_from((0.0, 0.3, 1.0)))
+def test_the_actions_offered_are_the_delta_close_ones_of_the_decision_trees_leaf(
+    table: DemonstrationTable, delta: float
+) -> None:
+    trained = train(table, last_action=True, max_depth=2)
+    feasible = feasible_states(trained.tree, table)
+    tree = re_bt_espresso(trained.tree, delta=delta, root=Root.PARALLEL)
+    groups = offered(tree, trained.tree.actions, feasible)
+    literals_of = States(FEATURES, feasible.states, last_action_column(LABELS, feasible.last))
+    for conjunction, leaf in trained.tree.paths():
+        rows = np.ones(len(feasible), dtype=bool)
+        for literal in conjunction:
+            rows &= literals_of.satisfy(literal)
+        close = np.zeros(len(LABELS), dtype=bool)
+        close[list(delta_close(leaf, delta))] = True
+        assert (groups[rows] == close).all()
+
+
+def offered(
+    tree: nodes.Node, actions: tuple[nodes.Action, ...], table: DemonstrationTable
+) -> BoolArray:
+    """Which actions stand in the PSA nodes, or alone, that are reached, shape (rows, actions)."""
+    states = States(FEATURES, table.states, last_action_column(LABELS, table.last))
+    ticked = triggered(reaching_all(tree), states)
+    return np.column_stack(
+        [ticked.get(action, np.zeros(len(table), dtype=bool)) for action in actions]
+    )
+
+
+def reaching_all(node: nodes.Node) -> nodes.Node:
+    match node:
+        case nodes.ParallelSelector(children=children):
+            return nodes.Parallel(children)
+        case nodes.Sequence() | nodes.Selector() | nodes.Parallel():
+            return replace(node, children=tuple(map(reaching_all, node.children)))
+        case _:
+            return node
+
+
+def test_a_tie_is_decided_as_the_decision_tree_decides_it() -> None:
+    leaf = Leaf((3, 5, 5, 0))
+    actions = tuple(nodes.Action(label, "action") for label in LABELS)
+    tree = re_bt_espresso(DecisionTree(actions, leaf), delta=0.0)
+    assert tree == nodes.ParallelSelector((actions[1], actions[2]))
+    assert leaf.most_probable == 1

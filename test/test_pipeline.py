@@ -1,0 +1,191 @@
+"""Learning from whole demonstrations: what is learned, how it is judged, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rebt_ros
+from rebt_ros import evaluation
+from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
+from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.table import tabulate
+from rebt_ros.errors import InputError, OptionError
+from rebt_ros.pipeline import (
+    LastActionUse,
+    LearnOptions,
+    learn,
+    learn_from,
+    only_channel,
+    summary_sentence,
+)
+from rebt_ros.storage.inputs import InputOptions
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
+SCITOS, TUTOR = SHARED / "scitos_g5_24.csv", SHARED / "tutor.csv"
+
+
+def demonstration(
+    name: str, shown: list[tuple[float, str]], channel: str = "action"
+) -> Demonstration:
+    """A demonstration with the feature ``x``."""
+    rows = [Row(t, channel, action, None, (x,)) for t, (x, action) in enumerate(shown)]
+    return Demonstration.from_rows(name, (Feature("x"),), rows)
+
+
+def turning_and_going(name: str, seed: int, rows: int = 60) -> Demonstration:
+    """Turns where x is positive, goes elsewhere."""
+    numbers = np.random.default_rng(seed).normal(size=rows).tolist()
+    return demonstration(name, [(x, "turn" if x > 0 else "go") for x in numbers])
+
+
+def there_and_back(name: str, rounds: int = 15) -> Demonstration:
+    """What to do depends on x and, as much, on the last action taken."""
+    one_round = [(0.0, "grasp"), (1.0, "go"), (0.0, "place"), (1.0, "return")]
+    return demonstration(name, one_round * rounds)
+
+
+def test_a_policy_that_was_shown_is_learned() -> None:
+    learned = learn([turning_and_going("one", 1), turning_and_going("two", 2)])
+    figures = learned.provenance.figures
+    assert figures.fidelity_mismatches == 0
+    assert figures.held_out_rows == 60
+    assert figures.own_history_agreement is not None
+    assert figures.own_history_agreement > 0.9
+    assert learned.provenance.demonstrations == 2
+    assert learned.provenance.rows == 120
+
+
+def test_last_actions_are_tested_only_where_that_raises_own_history_agreement() -> None:
+    auto = learn([there_and_back("one"), there_and_back("two")])
+    assert auto.provenance.uses_last_action
+    assert auto.provenance.figures.own_history_agreement == 1.0
+    plain = learn([turning_and_going("one", 1), turning_and_going("two", 2)])
+    assert not plain.provenance.uses_last_action
+
+
+@pytest.mark.parametrize("use", [LastActionUse.ALWAYS, LastActionUse.NEVER])
+def test_the_use_of_last_actions_can_be_prescribed(use: LastActionUse) -> None:
+    learned = learn([there_and_back("one"), there_and_back("two")], LearnOptions(last_action=use))
+    assert learned.provenance.uses_last_action is (use is LastActionUse.ALWAYS)
+
+
+def test_a_tree_is_learned_from_the_rows_that_are_not_held_out_unless_refitted() -> None:
+    # The second demonstration contradicts the first one.
+    first = demonstration("one", [(float(x), "go" if x < 5 else "turn") for x in range(10)])
+    second = demonstration("two", [(float(x), "turn" if x < 5 else "go") for x in range(10)])
+    third = demonstration("three", [(float(x), "turn" if x < 5 else "go") for x in range(10)])
+    never = LastActionUse.NEVER
+    options = LearnOptions(test_fraction=0.6, last_action=never)
+    held = learn([first, second, third], options)
+    assert held.provenance.figures.own_history_agreement == 0.0
+    refitted = learn([first, second, third], replace(options, refit=True))
+    assert refitted.provenance.figures.own_history_agreement == 0.0
+    assert refitted.tree != held.tree
+
+
+def test_nothing_is_judged_where_nothing_is_held_out() -> None:
+    learned = learn([turning_and_going("one", 1)], LearnOptions(test_fraction=0.0))
+    assert learned.provenance.figures.own_history_agreement is None
+    assert learned.provenance.figures.held_out_rows == 0
+    assert "no rows were held out" in summary_sentence(learned)
+
+
+def test_learning_twice_from_one_table_gives_equal_trees() -> None:
+    shown = [turning_and_going("one", 1), there_and_back("two")]
+    assert learn(shown) == learn(shown)
+
+
+def test_the_sentence_tells_rows_demonstrations_actions_nodes_and_agreement() -> None:
+    sentence = summary_sentence(learn([turning_and_going("one", 1), turning_and_going("two", 2)]))
+    for part in ("120 rows", "2 demonstrations", "2 actions", "8 nodes", "%"):
+        assert part in sentence
+
+
+def test_one_action_only_is_refused() -> None:
+    with pytest.raises(InputError, match="one action only"):
+        learn([demonstration("one", [(1.0, "go"), (2.0, "go")])])
+
+
+def test_no_rows_are_refused() -> None:
+    with pytest.raises(InputError, match="no demonstration rows"):
+        learn([demonstration("one", [])])
+    with pytest.raises(InputError, match="no demonstration rows"):
+        learn([])
+
+
+def test_two_rows_are_enough() -> None:
+    learned = learn([demonstration("one", [(1.0, "go"), (2.0, "turn")])])
+    assert learned.provenance.figures.fidelity_mismatches == 0
+
+
+def test_actions_on_two_channels_are_refused_with_their_names() -> None:
+    builder = DemonstrationBuilder([StateTopic("state")], ["arm", "base"])
+    builder.observe(0, "state", [1.0])
+    rows = [*builder.act(1, "arm", "grasp"), *builder.act(2, "base", "go")]
+    both = Demonstration.from_rows("both", builder.features or (), rows)
+    with pytest.raises(InputError, match=r"2 channels \('arm', 'base'\)"):
+        learn([both])
+
+
+def test_demonstrations_without_features_are_decided_by_their_majority() -> None:
+    rows = [Row(t, "action", label, None, ()) for t, label in enumerate("aabab")]
+    learned = learn(
+        [Demonstration.from_rows("one", (), rows)], LearnOptions(last_action=LastActionUse.NEVER)
+    )
+    assert [action.label for action in learned.actions] == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"delta": 1.5},
+        {"delta": -0.1},
+        {"delta": float("nan")},
+        {"max_depth": 0},
+        {"ccp_alpha": -1.0},
+        {"test_fraction": 1.0},
+        {"random_state": -1},
+    ],
+)
+def test_options_out_of_range_are_refused_by_name(wrong: dict[str, float]) -> None:
+    with pytest.raises(OptionError, match=next(iter(wrong))):
+        LearnOptions(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("root", Root)
+def test_a_parallel_and_a_selector_root_choose_alike(root: Root) -> None:
+    table = only_channel(tabulate([turning_and_going("one", 1), there_and_back("two")]))
+    learning = learn_from(table, LearnOptions(root=root, max_depth=None))
+    chosen = evaluation.teacher_forced_choices(learning.learned.tree, table)
+    assert (chosen == learning.decision_tree.predict(table)).all()
+
+
+@pytest.mark.skipif(not SCITOS.exists(), reason="third-party data is not there")
+def test_the_wall_following_robot_is_learned_without_a_mismatch() -> None:
+    result = rebt_ros.learn([SCITOS])
+    figures = result.learned.provenance.figures
+    assert result.learned.provenance.rows == 5456
+    assert len(result.learned.features) == 24
+    assert figures.held_out_rows == 1364
+    assert figures.fidelity_mismatches == 0
+    assert figures.own_history_agreement is not None
+    assert figures.own_history_agreement >= 0.95
+
+
+@pytest.mark.skipif(not TUTOR.exists(), reason="third-party data is not there")
+def test_the_robot_tutor_is_learned_with_its_missing_and_label_free_cells() -> None:
+    result = rebt_ros.learn([TUTOR], reading=InputOptions(label="/robot_dialogue"))
+    learned = result.learned
+    kinds = {feature.name: feature.kind for feature in learned.features}
+    assert learned.provenance.rows == 1000 - 186
+    assert any("186 of 1000 rows" in note for note in result.notes)
+    assert kinds["/ExerciseSubmissionResult"] is FeatureKind.CATEGORICAL
+    assert kinds["/KC"] is FeatureKind.NUMERIC
+    assert len(learned.actions) == 4
+    assert learned.provenance.figures.fidelity_mismatches == 0
