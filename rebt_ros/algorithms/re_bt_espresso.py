@@ -74,7 +74,7 @@ def pullout_common(rules: Iterable[Rule]) -> tuple[FactoredRule, ...]:
 
 def rule_tree(rule: FactoredRule, inv_set: frozenset[Literal]) -> nodes.Node:
     """Lines 9 to 26: a Sequence of the rule's condition and its action."""
-    return _sequence([*_condition_trees(rule.condition, inv_set), action_tree(rule.actions)])
+    return sequence([*condition_trees(rule.condition, inv_set), action_tree(rule.actions)])
 
 
 def action_tree(actions: tuple[nodes.Action, ...]) -> nodes.Node:
@@ -93,13 +93,11 @@ def with_root(root: Root, children: Sequence[nodes.Node]) -> nodes.Node:
             return nodes.Selector(tuple(children))
 
 
-def _condition_trees(condition: Factored, inv_set: frozenset[Literal]) -> list[nodes.Node]:
+def condition_trees(condition: Factored, inv_set: frozenset[Literal]) -> list[nodes.Node]:
     """Lines 14 to 26: what must succeed, one after the other, before the action."""
     trees: list[nodes.Node] = [_literal_tree(literal, inv_set) for literal in condition.common]
     if condition.alternatives:
-        alternatives = [
-            _sequence(_condition_trees(one, inv_set)) for one in condition.alternatives
-        ]
+        alternatives = [sequence(condition_trees(one, inv_set)) for one in condition.alternatives]
         trees.append(nodes.Selector(tuple(alternatives)))
     return trees
 
@@ -111,5 +109,6 @@ def _literal_tree(literal: Literal, inv_set: frozenset[Literal]) -> nodes.Node:
     return nodes.Condition(literal)
 
 
-def _sequence(children: Sequence[nodes.Node]) -> nodes.Node:
+def sequence(children: Sequence[nodes.Node]) -> nodes.Node:
+    """A Sequence of the children, or the only child itself."""
     return children[0] if len(children) == 1 else nodes.Sequence(tuple(children))

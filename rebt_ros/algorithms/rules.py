@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from rebt_ros.behavior_tree.nodes import Action
 from rebt_ros.decision_tree.tree import DecisionTree, Leaf
-from rebt_ros.logic.conditions import LastActionIs, deciding
+from rebt_ros.logic.conditions import deciding
 from rebt_ros.logic.dnf import Conjunction, Dnf
 from rebt_ros.logic.factoring import Factored
 
@@ -37,8 +37,12 @@ class FactoredRule:
 
 
 def dt_to_rules(tree: DecisionTree) -> tuple[Rule, ...]:
-    """BT-Espresso's rules: each leaf triggers its most probable action."""
-    return _rules(tree, lambda leaf: (leaf.most_probable,))
+    """BT-Espresso's rules: each leaf triggers its most probable action.
+
+    Returns:
+        As for `dt_to_rules_psa`.
+    """
+    return tuple(map(in_its_own_words, leaf_rules(tree, lambda leaf: (leaf.most_probable,))))
 
 
 def dt_to_rules_psa(tree: DecisionTree, delta: float) -> tuple[Rule, ...]:
@@ -51,9 +55,9 @@ def dt_to_rules_psa(tree: DecisionTree, delta: float) -> tuple[Rule, ...]:
 
     Returns:
         Rules that no two leaves share and that together cover every state, the best supported
-        first.  Each has the literals of its LAT conditions decide its own actions.
+        first.  Their LAT conditions are meant from their own actions' side.
     """
-    return _rules(tree, lambda leaf: delta_close(leaf, delta))
+    return tuple(map(in_its_own_words, leaf_rules(tree, lambda leaf: delta_close(leaf, delta))))
 
 
 def delta_close(leaf: Leaf, delta: float) -> tuple[int, ...]:
@@ -69,7 +73,13 @@ def delta_close(leaf: Leaf, delta: float) -> tuple[int, ...]:
     )
 
 
-def _rules(tree: DecisionTree, triggered: Callable[[Leaf], tuple[int, ...]]) -> tuple[Rule, ...]:
+def leaf_rules(
+    tree: DecisionTree, triggered: Callable[[Leaf], tuple[int, ...]]
+) -> tuple[Rule, ...]:
+    """The rules of a decision tree whose leaves trigger what `triggered` says.
+
+    LAT is the decision tree's column still, one variable for all rules.
+    """
     leaves: dict[tuple[int, ...], list[tuple[Conjunction, Leaf]]] = {}
     for conjunction, leaf in tree.paths():
         leaves.setdefault(triggered(leaf), []).append((conjunction, leaf))
@@ -86,17 +96,18 @@ def _rule(
     ranked = sorted(zip(support, group, strict=True), key=lambda pair: -pair[0])
     actions = tuple(tree.actions[one] for _, one in ranked)
     rows = sum(sum(leaf.distribution) for _, leaf in paths)
-    return Rule(actions, in_rule_of(actions, (conjunction for conjunction, _ in paths)), rows)
+    return Rule(actions, Dnf(tuple(conjunction for conjunction, _ in paths)), rows)
 
 
-def in_rule_of(actions: Iterable[Action], conjunctions: Iterable[Conjunction]) -> Dnf:
-    """The conjunctions with their LAT literals meant from the side of a rule for `actions`."""
-    labels = tuple(action.label for action in actions)
-    return Dnf(
-        tuple(
-            Conjunction(tuple(deciding(literal, labels) for literal in conjunction))
-            if any(isinstance(one.condition, LastActionIs) for one in conjunction)
-            else conjunction
-            for conjunction in conjunctions
-        )
+def in_its_own_words(rule: Rule) -> Rule:
+    """The rule with LAT meant from its own side: the last action that is none of its own."""
+    return Rule(
+        rule.actions,
+        Dnf(
+            tuple(
+                Conjunction(tuple(deciding(literal, rule.labels) for literal in conjunction))
+                for conjunction in rule.dnf
+            )
+        ),
+        rule.support,
     )

@@ -205,7 +205,7 @@ class _Contour:
 def _centres(
     boxes: Sequence[Box], children: Sequence[Sequence[int]], gaps: tuple[float, float]
 ) -> list[float]:
-    """x of each box's middle when every subtree is as far to the left as it goes.
+    """Where each box's middle is when every subtree is as far to the left as it goes.
 
     Joining two contours takes as many steps as the lower one has levels, and those levels are
     hidden for good, so that all joins together take linear time.

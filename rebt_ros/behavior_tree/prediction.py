@@ -65,14 +65,14 @@ class States:
         index, feature = next(
             (index, one) for index, one in enumerate(self.features) if one.name == condition.feature
         )
-        column = self.values[:, index]
+        column: FloatArray = self.values[:, index]
         match condition:
             case Threshold(value=value):
-                return column <= value
+                return np.less_equal(column, value)
             case IsTrue():
-                return column == 1
+                return np.equal(column, 1)
             case HasCategory(category=category):
-                return column == feature.categories.index(category)
+                return np.equal(column, feature.categories.index(category))
 
 
 def triggered(tree: nodes.Node, states: States) -> dict[nodes.Action, BoolArray]:
@@ -134,4 +134,6 @@ def _tick(
             return succeeded
         case nodes.Parallel(children=children):
             results = [_tick(child, states, reached, ticked) for child in children]
-            return np.logical_and.reduce(results)
+            for succeeded in results:
+                reached = reached & succeeded
+            return reached

@@ -19,7 +19,14 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.wording import Wording
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, LastActionIs, Literal, Threshold
+from rebt_ros.logic.conditions import (
+    Condition,
+    HasCategory,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    Threshold,
+)
 
 
 class Commander(Protocol):
@@ -70,6 +77,7 @@ class TreeRuntime:
         learned: The tree and its features.
         commander: Carries out the actions.
         tree: What to run instead of ``learned.tree``, such as its `executable` form.
+        histories: Histories to go on with, by channel, as when one tree follows another.
     """
 
     def __init__(
@@ -77,10 +85,12 @@ class TreeRuntime:
         learned: LearnedTree,
         commander: Commander | None = None,
         tree: nodes.Node | None = None,
+        histories: Mapping[str, ActionHistory] | None = None,
     ) -> None:
         self.learned = learned
         self.histories = {action.channel: ActionHistory() for action in learned.actions}
-        """LAT of each channel: the actions that the tree has taken, and what is added to them."""
+        """What was taken on each channel, by the tree or by others who note it here."""
+        self.histories.update(histories or {})
         self._commander = SucceedAtOnce() if commander is None else commander
         self._state: Sequence[float] = ()
         self._ticked: list[nodes.Action] = []
@@ -204,11 +214,19 @@ class StateEncoder:
 
     def __init__(self, features: Sequence[Feature], default_topic: str = "state") -> None:
         self._sources = [
-            (feature, feature.topic or default_topic, place if feature.index is None else feature.index)
+            (
+                feature,
+                feature.topic or default_topic,
+                place if feature.index is None else feature.index,
+            )
             for place, feature in enumerate(features)
         ]
         self._codes = [
-            {float(name): float(code) for code, name in enumerate(feature.categories) if _number(name)}
+            {
+                float(name): float(code)
+                for code, name in enumerate(feature.categories)
+                if _number(name)
+            }
             for feature in features
         ]
         self.topics: dict[str, int] = {}

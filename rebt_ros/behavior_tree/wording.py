@@ -35,7 +35,7 @@ _MOST_DIGITS = 17
 _PLAIN_EXPONENTS = range(-4, 7)
 
 _SIGNS = frozenset("=≠<>≤≥")
-_QUOTES = frozenset("'\"`‘’‚‛“”„‟")
+_QUOTES = frozenset("'\"`\u2018\u2019\u201c\u201d")
 
 
 class Kind(Enum):
@@ -200,7 +200,7 @@ def distinct_texts(values: Iterable[float]) -> dict[float, str]:
     side of every other number's text as the number itself.
 
     >>> distinct_texts([0.5, 0.30000001192092896, 0.83712, 0.83749])
-    {0.30000001192092896: '0.3', 0.5: '0.5', 0.83712: '0.8371', 0.83749: '0.8375'}
+    {0.30000001192092896: '0.3', 0.5: '0.5', 0.83712: '0.837', 0.83749: '0.8375'}
     """
     ordered = sorted(set(values))
     middles = [(Fraction(low) + Fraction(high)) / 2 for low, high in pairwise(ordered)]

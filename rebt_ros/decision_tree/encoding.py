@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rebt_ros.arrays import Float32Array
+from rebt_ros.arrays import Float32Array, FloatArray, IntArray
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import (
@@ -111,5 +111,5 @@ def exact_threshold(threshold: float) -> float:
     return middle if tie_goes_down else float(np.nextafter(middle, -np.inf))
 
 
-def _one_hot(codes: np.ndarray, count: int) -> Float32Array:
-    return (codes[:, np.newaxis] == np.arange(count)).astype(np.float32)
+def _one_hot(codes: FloatArray | IntArray, count: int) -> Float32Array:
+    return np.equal(codes[:, np.newaxis], np.arange(count)).astype(np.float32)

@@ -69,7 +69,8 @@ class DemonstrationTable:
             return np.zeros(len(self), dtype=bool)
         if len(shown) == 1:
             return np.arange(len(self)) >= _share_kept(len(self), fraction)
-        return self.demonstration >= shown[_share_kept(len(shown), fraction)]
+        first = int(shown[_share_kept(len(shown), fraction)])
+        return np.greater_equal(self.demonstration, first)
 
 
 def _share_kept(count: int, fraction: float) -> int:

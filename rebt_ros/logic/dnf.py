@@ -58,6 +58,4 @@ FALSE = Dnf()
 
 def conditions_of(dnf: Dnf) -> tuple[Condition, ...]:
     """Each condition of the DNF once, in the order in which it first occurs."""
-    return tuple(
-        dict.fromkeys(literal.condition for conjunction in dnf for literal in conjunction)
-    )
+    return tuple(dict.fromkeys(literal.condition for conjunction in dnf for literal in conjunction))

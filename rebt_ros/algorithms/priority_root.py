@@ -1,0 +1,117 @@
+"""Past the paper: a Selector root whose children stand in order of priority.
+
+Under the paper's root each rule must hold in exactly its own states.  Under a Selector a child is
+reached only where all earlier ones failed, so that it may do anything in the states that they
+take: these are don't-cares of its minimization.  The last child is reached only in its own states
+and needs no condition at all.  The result chooses what the decision tree predicts in every state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from rebt_ros.algorithms.re_bt_espresso import rule_tree
+from rebt_ros.algorithms.rules import FactoredRule, Rule
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.logic.conditions import deciding
+from rebt_ros.logic.dnf import FALSE, TRUE, Dnf, conditions_of
+from rebt_ros.logic.domain import infeasible
+from rebt_ros.logic.factoring import Factored, factor, pull_out_common
+from rebt_ros.logic.float_reduction import float_reduction
+from rebt_ros.logic.minimize import minimize
+
+#: Up to this many rules the best order is found, beyond it the order that is best step by step.
+_MOST_RULES_IN_ANY_ORDER = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Reductions:
+    """The reductions past the paper, each of which can be left out."""
+
+    domain: bool = True
+    """Infeasible combinations of conditions are don't-cares."""
+    repeated_factoring: bool = True
+    """Factoring is repeated instead of done once."""
+    priority: bool = True
+    """Rules stand in order of priority, with the states of earlier ones as don't-cares."""
+
+
+def priority_selector(rules: Sequence[Rule], reductions: Reductions = Reductions()) -> nodes.Node:
+    """A Selector over the rules, reduced as far as asked.
+
+    Args:
+        rules: From `leaf_rules`: no two share a state, and together they cover all of them.
+        reductions: What to do.
+    """
+    domain = (
+        infeasible(conditions_of(_union(rule.dnf for rule in rules)))
+        if reductions.domain
+        else FALSE
+    )
+
+    @cache
+    def child(rule: int, earlier: frozenset[int]) -> nodes.Node:
+        if len(earlier) == len(rules) - 1:
+            return _child(rules[rule].actions, TRUE, reductions)
+        taken = (rules[one].dnf for one in sorted(earlier))
+        minimized = minimize(rules[rule].dnf, dont_care=_union((*taken, domain)))
+        return _child(rules[rule].actions, float_reduction(minimized), reductions)
+
+    if not reductions.priority:
+        alone = [minimize(rule.dnf, dont_care=domain) for rule in rules]
+        trees = [
+            _child(rule.actions, float_reduction(dnf), reductions)
+            for rule, dnf in zip(rules, alone, strict=True)
+        ]
+    else:
+        order = _best_order(len(rules), lambda rule, earlier: nodes.size(child(rule, earlier)))
+        trees = [child(rule, frozenset(order[:place])) for place, rule in enumerate(order)]
+    return trees[0] if len(trees) == 1 else nodes.Selector(tuple(trees))
+
+
+def _child(actions: tuple[nodes.Action, ...], dnf: Dnf, reductions: Reductions) -> nodes.Node:
+    condition = factor(dnf) if reductions.repeated_factoring else pull_out_common(dnf)
+    labels = tuple(action.label for action in actions)
+    return rule_tree(FactoredRule(actions, _meant_by(labels, condition)), frozenset())
+
+
+def _best_order(rules: int, cost: Callable[[int, frozenset[int]], int]) -> tuple[int, ...]:
+    """The order with the lowest sum of costs, or a good one where there are many rules.
+
+    Args:
+        rules: Number of rules.
+        cost: Of a rule after the set of those that come before it.
+    """
+    if rules > _MOST_RULES_IN_ANY_ORDER:
+        order: tuple[int, ...] = ()
+        while len(order) < rules:
+            earlier = frozenset(order)
+            left = (rule for rule in range(rules) if rule not in earlier)
+            order = (*order, min(left, key=lambda rule: cost(rule, earlier)))
+        return order
+    # What follows a set of rules does not depend on their order: dynamic programming over sets.
+    best: dict[frozenset[int], tuple[int, tuple[int, ...]]] = {frozenset(): (0, ())}
+    for _ in range(rules):
+        longer: dict[frozenset[int], tuple[int, tuple[int, ...]]] = {}
+        for earlier, (total, order) in best.items():
+            for rule in range(rules):
+                if rule not in earlier:
+                    extended = (total + cost(rule, earlier), (*order, rule))
+                    key = earlier | {rule}
+                    longer[key] = min(longer.get(key, extended), extended)
+        best = longer
+    return best[frozenset(range(rules))][1]
+
+
+def _union(dnfs: Iterable[Dnf]) -> Dnf:
+    return Dnf(tuple(conjunction for dnf in dnfs for conjunction in dnf))
+
+
+def _meant_by(actions: tuple[str, ...], condition: Factored) -> Factored:
+    """The condition as it is meant in a rule for these actions."""
+    return Factored(
+        tuple(deciding(literal, actions) for literal in condition.common),
+        tuple(_meant_by(actions, one) for one in condition.alternatives),
+    )

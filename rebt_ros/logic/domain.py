@@ -1,0 +1,58 @@
+"""What conditions say about each other: combinations that no state has.
+
+Espresso minimizes over free variables.  Conditions are not free: of two thresholds the lower one
+implies the higher one, and a feature has at most one category, as LAT is at most one action.
+Handed to espresso as don't-cares, the infeasible combinations make smaller rules that are the same
+in every state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+from itertools import combinations, pairwise
+
+from rebt_ros.logic.conditions import (
+    Condition,
+    HasCategory,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    Threshold,
+)
+from rebt_ros.logic.dnf import Conjunction, Dnf
+
+
+def infeasible(conditions: Iterable[Condition]) -> Dnf:
+    """The combinations of conditions that no state has, as a DNF that is linear in thresholds.
+
+    >>> near, reachable = Threshold("x", 0.3), Threshold("x", 0.5)
+    >>> infeasible([reachable, near]) == Dnf(
+    ...     (Conjunction((Literal(near), Literal(reachable, positive=False))),)
+    ... )
+    True
+    """
+    thresholds: dict[str, set[Threshold]] = {}
+    exclusive: dict[Hashable, list[Condition]] = {}
+    for condition in dict.fromkeys(conditions):
+        match condition:
+            case Threshold(feature=feature):
+                thresholds.setdefault(feature, set()).add(condition)
+            case HasCategory(feature=feature):
+                exclusive.setdefault(feature, []).append(condition)
+            case LastActionIs(deciding=deciding):
+                exclusive.setdefault(deciding, []).append(condition)
+            case IsTrue():
+                pass
+    # Neighbours are enough: below the first but not below the third threshold means not to lie
+    # between one of the two pairs of neighbours.
+    lower_without_higher = (
+        Conjunction((Literal(lower), ~Literal(higher)))
+        for group in thresholds.values()
+        for lower, higher in pairwise(sorted(group, key=lambda one: one.value))
+    )
+    two_at_once = (
+        Conjunction((Literal(one), Literal(other)))
+        for group in exclusive.values()
+        for one, other in combinations(group, 2)
+    )
+    return Dnf((*lower_without_higher, *two_at_once))
