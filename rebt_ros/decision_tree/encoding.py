@@ -96,7 +96,7 @@ def exact_threshold(threshold: float) -> float:
     cases for every double-precision x: it is the largest double that rounds to a single-precision
     number not above `threshold`.
 
-    >>> bool(np.float32(0.1) <= 0.1), 0.1 <= exact_threshold(0.1)
+    >>> float(np.float32(0.1)) <= 0.1, 0.1 <= exact_threshold(0.1)
     (False, False)
     """
     with np.errstate(over="ignore"):

@@ -1,7 +1,4 @@
-"""Training of decision trees (paper, IV-A): CART with Gini impurity, from scikit-learn.
-
-The only module that knows scikit-learn.
-"""
+"""Training of decision trees (paper, IV-A): CART with Gini impurity, from scikit-learn."""
 
 from __future__ import annotations
 
@@ -11,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from sklearn.tree import DecisionTreeClassifier
 
-from rebt_ros.arrays import IntArray
+from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree.nodes import Action
 from rebt_ros.decision_tree.encoding import Indicator, Number, columns, encode
+from rebt_ros.decision_tree.pruning import PruningPath, pruning_path
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.table import DemonstrationTable
 
@@ -26,11 +24,66 @@ class TrainedTree:
     uses_last_action: bool
     """Whether LAT was among the columns."""
     classifier: DecisionTreeClassifier
+    """Fitted, not pruned."""
+    standing: IntArray
+    """The node that decides for each node of the classifier: itself, or what it is pruned to."""
 
     def predict(self, table: DemonstrationTable) -> IntArray:
         """scikit-learn's own prediction: positions in ``table.actions``, shape (rows,)."""
-        predicted = self.classifier.predict(encode(table, self.uses_last_action))
-        return np.asarray(predicted, dtype=np.int64)
+        leaves = self.classifier.apply(encode(table, self.uses_last_action))
+        majority = np.argmax(self.classifier.tree_.value[:, 0, :], axis=1)
+        return np.asarray(self.classifier.classes_[majority[self.standing[leaves]]], dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FittedTree:
+    """One fit with all its pruning levels."""
+
+    classifier: DecisionTreeClassifier
+    path: PruningPath
+    actions: tuple[Action, ...]
+    asked: tuple[Number | Indicator, ...]
+    """What each column of the encoded table asks."""
+    uses_last_action: bool
+
+    def at(self, ccp_alpha: float) -> TrainedTree:
+        """The tree as pruned at `ccp_alpha`; equal to scikit-learn's own fit with it."""
+        is_leaf = self.path.leaves_at(ccp_alpha)
+        return TrainedTree(
+            DecisionTree(
+                self.actions, _as_data(self.classifier, self.asked, self.actions, is_leaf)
+            ),
+            self.uses_last_action,
+            self.classifier,
+            self.path.standing(is_leaf),
+        )
+
+
+def fit(
+    table: DemonstrationTable,
+    *,
+    last_action: bool,
+    max_depth: int | None = None,
+    random_state: int = 0,
+) -> FittedTree:
+    """Fits a decision tree.
+
+    Args:
+        table: At least one row.
+        last_action: Whether the tree may test LAT.
+        max_depth: Splits on the longest path; None for no limit.
+        random_state: Decides between equally good splits.
+    """
+    classifier = DecisionTreeClassifier(
+        criterion="gini", max_depth=max_depth, random_state=random_state
+    )
+    with warnings.catch_warnings():
+        # Actions are codes here; that there are many does not make this a regression.
+        warnings.filterwarnings("ignore", message="The number of unique classes")
+        classifier.fit(encode(table, last_action), table.chosen)
+    actions = tuple(Action(label, table.channel) for label in table.actions)
+    path = pruning_path(classifier)
+    return FittedTree(classifier, path, actions, columns(table, last_action), last_action)
 
 
 def train(
@@ -41,43 +94,30 @@ def train(
     ccp_alpha: float = 0.0,
     random_state: int = 0,
 ) -> TrainedTree:
-    """Trains one decision tree.
-
-    Args:
-        table: At least one row.
-        last_action: Whether the tree may test LAT.
-        max_depth: Splits on the longest path; None for no limit.
-        ccp_alpha: Complexity parameter of minimal cost-complexity pruning; 0 prunes nothing.
-        random_state: Decides between equally good splits.
-    """
-    classifier = DecisionTreeClassifier(
-        criterion="gini", max_depth=max_depth, ccp_alpha=ccp_alpha, random_state=random_state
-    )
-    with warnings.catch_warnings():
-        # Actions are codes here; that there are many does not make this a regression.
-        warnings.filterwarnings("ignore", message="The number of unique classes")
-        classifier.fit(encode(table, last_action), table.chosen)
-    actions = tuple(Action(label, table.channel) for label in table.actions)
-    root = _as_data(classifier, columns(table, last_action), len(actions))
-    return TrainedTree(DecisionTree(actions, root), last_action, classifier)
+    """Fits a decision tree and prunes it at `ccp_alpha`; see `fit`."""
+    fitted = fit(table, last_action=last_action, max_depth=max_depth, random_state=random_state)
+    return fitted.at(ccp_alpha)
 
 
 def _as_data(
-    classifier: DecisionTreeClassifier, asked: tuple[Number | Indicator, ...], actions: int
+    classifier: DecisionTreeClassifier,
+    asked: tuple[Number | Indicator, ...],
+    actions: tuple[Action, ...],
+    is_leaf: BoolArray,
 ) -> DecisionNode:
     fitted = classifier.tree_
     # Shares of rows; scaled back to whole rows, which keeps ties exact.
     rows = np.rint(fitted.value[:, 0, :] * fitted.n_node_samples[:, np.newaxis]).astype(np.int64)
-    distributions = np.zeros((fitted.node_count, actions), dtype=np.int64)
+    distributions = np.zeros((fitted.node_count, len(actions)), dtype=np.int64)
     distributions[:, classifier.classes_] = rows
     data: dict[int, DecisionNode] = {}
     # scikit-learn numbers children after their parents.
     for node in range(fitted.node_count - 1, -1, -1):
-        left, right = int(fitted.children_left[node]), int(fitted.children_right[node])
-        if left == right:
+        if is_leaf[node]:
             data[node] = Leaf(tuple(distributions[node].tolist()))
             continue
+        left, right = int(fitted.children_left[node]), int(fitted.children_right[node])
         literal = asked[fitted.feature[node]].at_most(float(fitted.threshold[node]))
         holds, fails = (left, right) if literal.positive else (right, left)
-        data[node] = Split(literal.condition, data.pop(holds), data.pop(fails))
+        data[node] = Split(literal.condition, data[holds], data[fails])
     return data[0]

@@ -19,6 +19,9 @@ from rebt_ros.errors import InputError, OptionError
 #: Larger values are refused: single precision, in which decision trees compare, ends soon after.
 LARGEST_VALUE = 1e38
 
+#: Rows per second that can be asked for.
+_LEAST_RATE, _LARGEST_RATE = 1e-6, 1e6
+
 #: Sampling pauses where no state came for this long (nanoseconds).
 _STALE = 1_000_000_000
 
@@ -68,7 +71,7 @@ class DemonstrationBuilder:
         sample_rate: Rows per second and channel while an action holds; None for event mode.
 
     Raises:
-        OptionError: No topic or channel, one named twice, or a rate that is not positive.
+        OptionError: No topic or channel, one named twice, or a rate that makes no sense.
     """
 
     def __init__(
@@ -82,8 +85,11 @@ class DemonstrationBuilder:
             raise OptionError("a demonstration needs at least one state topic and action topic.")
         if len({*names, *channels}) != len(names) + len(channels):
             raise OptionError(f"the topics {[*names, *channels]} must differ from each other.")
-        if sample_rate is not None and not (0 < sample_rate < math.inf):
-            raise OptionError(f"the sample rate must be positive, not {sample_rate}.")
+        if sample_rate is not None and not (_LEAST_RATE <= sample_rate <= _LARGEST_RATE):
+            raise OptionError(
+                f"the sample rate must lie between {_LEAST_RATE:g} and {_LARGEST_RATE:g} rows per "
+                f"second, not at {sample_rate}."
+            )
         self._fields: dict[str, tuple[str, ...]] = {one.name: one.fields for one in topics}
         self._latest: dict[str, tuple[float, ...]] = {}
         self._features: tuple[Feature, ...] | None = None
@@ -212,9 +218,11 @@ class DemonstrationBuilder:
         while self._next_sample < end:
             rows += [self._row(self._next_sample, *held) for held in self._held.items()]
             self._next_sample += self._period
-        if end < stamp or self._next_sample > stamp + self._period:
+        if self._next_sample < stamp or self._next_sample > stamp + self._period:
             # Silence or a clock that was set back: the grid starts anew here.
             self._next_sample = stamp
+        # No message is newer than the present one, whatever the clock said.
+        self._last_observed = min(self._last_observed, stamp)
         return tuple(rows)
 
 

@@ -37,7 +37,11 @@ def float_reduction(dnf: Dnf) -> Dnf:
     conjunctions of which one implies the other, the weaker stays.  The truth value is unchanged
     in every state.
     """
-    reduced = dict.fromkeys(_strongest(conjunction) for conjunction in dnf)
+    distinct: dict[frozenset[Literal], Conjunction] = {}
+    for conjunction in map(_strongest, dnf):
+        # Two that differ in nothing but the order of their literals would subsume each other.
+        distinct.setdefault(frozenset(conjunction), conjunction)
+    reduced = distinct.values()
     return Dnf(
         tuple(
             conjunction

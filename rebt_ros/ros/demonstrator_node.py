@@ -1,0 +1,62 @@
+"""The scripted demonstrator as a node: it answers every state of the robot with an action."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import SetBool
+
+from rebt_ros.demonstration.fields import fields_of
+from rebt_ros.ros import lifetime
+from rebt_ros.ros.diagnostics import Faults
+from rebt_ros.ros.parameters import Parameters
+from rebt_ros.simulation.demonstrator import decide
+from rebt_ros.simulation.robot import State
+
+
+class DemonstratorNode(Node):
+    """Drives the simulated robot while it is enabled.
+
+    Raises:
+        OptionError: A parameter makes no sense.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("demonstrator")
+        self._enabled = Parameters(self).flag("enabled", True, "Whether to drive from the start.")()
+        self._faults = Faults(self.get_logger())
+        self._actions = self.create_publisher(String, "action", 10)
+        self.create_subscription(Float64MultiArray, "state", self._on_state, 1)
+        self.create_service(SetBool, "~/enable", self._on_enable)
+        self.get_logger().info(self._what_it_does())
+
+    def _on_state(self, message: Float64MultiArray) -> None:
+        if not self._enabled:
+            return
+        fields = fields_of([one.label for one in message.layout.dim], len(message.data))
+        if fields != State._fields:
+            self._faults.note(
+                "foreign state",
+                f"a state of {len(message.data)} values is left out: "
+                f"its layout must name {', '.join(State._fields)}.",
+            )
+            return
+        self._actions.publish(String(data=decide(message.data)))
+
+    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        self._enabled = request.data
+        response.success = True
+        response.message = self._what_it_does()
+        return response
+
+    def _what_it_does(self) -> str:
+        return "driving the robot." if self._enabled else "not driving the robot."
+
+
+def main(args: list[str] | None = None) -> None:
+    """Runs the demonstrator."""
+    lifetime.run(DemonstratorNode, args)
+
+
+if __name__ == "__main__":
+    main()

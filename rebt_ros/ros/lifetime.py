@@ -1,0 +1,142 @@
+"""The life of a node's process: start, spin, and an orderly end whatever the moment."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import rclpy
+from rclpy.exceptions import (
+    InvalidNamespaceException,
+    InvalidNodeNameException,
+    InvalidServiceNameException,
+    InvalidTopicNameException,
+    ParameterException,
+)
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    MultiThreadedExecutor,
+    SingleThreadedExecutor,
+)
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import (
+    SignalHandlerOptions,
+    install_signal_handlers,
+    uninstall_signal_handlers,
+)
+from rclpy.utilities import ok, try_shutdown
+
+from rebt_ros.errors import RebtError
+
+#: What a user can get wrong with a node's arguments, parameters and remappings.
+_WRONG_START = (
+    RebtError,
+    ParameterException,
+    InvalidNamespaceException,
+    InvalidNodeNameException,
+    InvalidServiceNameException,
+    InvalidTopicNameException,
+)
+
+_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def run(factory: Callable[[], Node], args: list[str] | None = None, *, threads: int = 1) -> None:
+    """Runs a node until SIGINT, SIGTERM or a shutdown of its context.
+
+    A signal never interrupts a callback, only the spinning between callbacks.  A node that has a
+    method ``close()`` gets it called, outside of any callback, before it is destroyed.
+
+    Args:
+        factory: Makes the node; called once ROS is initialized.
+        args: Command line, the program's name included; ``sys.argv`` if None.
+        threads: Number of threads that run callbacks.
+
+    Raises:
+        SystemExit: With code 1 where arguments or parameters keep the node from starting; a
+            sentence on standard error says why.
+    """
+    with _noted_signals() as stopped:
+        try:
+            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        except Exception as err:
+            _give_up(f"these arguments are not understood: {_first_sentence(err)}", err)
+        try:
+            if not stopped():
+                _live(factory, threads, stopped)
+        finally:
+            try_shutdown()
+
+
+def _live(factory: Callable[[], Node], threads: int, stopped: Callable[[], bool]) -> None:
+    try:
+        node = factory()
+    except _WRONG_START as err:
+        if ok():
+            _give_up(str(err), err)
+        return
+    except Exception:
+        # A signal shuts the context down, upon which all that rclpy still creates raises.
+        if ok():
+            raise
+        return
+    try:
+        _spin(node, threads, stopped)
+    finally:
+        close = getattr(node, "close", None)
+        if close is not None:
+            close()
+        node.destroy_node()
+
+
+def _spin(node: Node, threads: int, stopped: Callable[[], bool]) -> None:
+    executor: Executor | None = None
+    try:
+        executor = MultiThreadedExecutor(threads) if threads > 1 else SingleThreadedExecutor()
+        executor.add_node(node)
+        # Only now, because rclpy cannot create things in a context that a signal has shut down.
+        install_signal_handlers()
+        while ok() and not stopped():
+            executor.spin_once()
+    except ExternalShutdownException:
+        pass
+    except Exception:
+        # A callback that publishes just after the context was shut down.
+        if ok():
+            raise
+    finally:
+        if executor is not None:
+            executor.shutdown()
+
+
+@contextmanager
+def _noted_signals() -> Iterator[Callable[[], bool]]:
+    """Replaces KeyboardInterrupt and sudden death by a note, also where rclpy does not listen.
+
+    While a node spins, rclpy hears the signals first, shuts the context down, and then calls the
+    handlers set here.
+    """
+    came: list[int] = []
+    before = {
+        one: signal.signal(one, lambda number, _: came.append(number)) for one in _STOP_SIGNALS
+    }
+    try:
+        yield lambda: bool(came)
+    finally:
+        uninstall_signal_handlers()
+        for one, handler in before.items():
+            signal.signal(one, handler)
+
+
+def _give_up(sentence: str, err: Exception) -> None:
+    get_logger("rebt_ros").fatal(" ".join(sentence.split()))
+    sys.stderr.flush()
+    raise SystemExit(1) from err
+
+
+def _first_sentence(err: Exception) -> str:
+    return str(err).split(", at /")[0]

@@ -1,0 +1,156 @@
+"""Declaring a node's parameters: each with type, range, description, and one clear sentence.
+
+A parameter is *fixed* where the node reads it once, when it starts: setting it later is refused
+instead of being ignored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from rebt_ros.errors import OptionError
+
+T = TypeVar("T")
+
+_TYPES = {
+    bool: "true or false",
+    int: "an integer",
+    float: "a number with a decimal point, such as 1.0",
+    str: "a text",
+    list: "a list of texts",
+}
+
+
+class Parameters:
+    """Declares parameters of a node; every method returns a function that reads the value.
+
+    All of them raise `OptionError` where the value that the node was started with has another
+    type or lies out of range.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._choices: dict[str, tuple[str, ...]] = {}
+        node.add_on_set_parameters_callback(self._refuse_other_choices)
+
+    def flag(
+        self, name: str, default: bool, description: str, *, fixed: bool = True
+    ) -> Callable[[], bool]:
+        """A Boolean."""
+        return self._declare(name, default, _descriptor(description, fixed))
+
+    def integer(
+        self, name: str, default: int, description: str, low: int, high: int, *, fixed: bool = True
+    ) -> Callable[[], int]:
+        """An integer in [low, high]."""
+        descriptor = _descriptor(description, fixed)
+        descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
+        return self._declare(name, default, descriptor)
+
+    def number(
+        self,
+        name: str,
+        default: float,
+        description: str,
+        low: float,
+        high: float,
+        *,
+        fixed: bool = True,
+    ) -> Callable[[], float]:
+        """A number in [low, high]."""
+        descriptor = _descriptor(description, fixed)
+        descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
+        return self._declare(name, default, descriptor)
+
+    def text(
+        self,
+        name: str,
+        default: str,
+        description: str,
+        *,
+        choices: Sequence[str] = (),
+        fixed: bool = True,
+    ) -> Callable[[], str]:
+        """A text; one of `choices` where there are some."""
+        descriptor = _descriptor(description, fixed)
+        if choices:
+            self._choices[name] = tuple(choices)
+            descriptor.additional_constraints = f"one of: {', '.join(choices)}"
+        return self._declare(name, default, descriptor)
+
+    def texts(
+        self, name: str, default: Sequence[str], description: str, *, fixed: bool = True
+    ) -> Callable[[], tuple[str, ...]]:
+        """A list of texts.  Empty ones do not count: ROS 2 cannot write down an empty list."""
+        descriptor = _descriptor(description, fixed)
+        read = self._declare(name, list(default) or [""], descriptor)
+        return lambda: tuple(one for one in read() if one)
+
+    def directory(
+        self, name: str, default: str, description: str, *, fixed: bool = True
+    ) -> Callable[[], Path]:
+        """A directory; ``~`` is the user's home.
+
+        Raises:
+            OptionError: It is empty.
+        """
+        read = self.text(name, default, description, fixed=fixed)
+
+        def path() -> Path:
+            if not read():
+                raise OptionError(f"parameter {name!r} is empty: give it a directory.")
+            return Path(read()).expanduser()
+
+        path()
+        return path
+
+    def _declare(self, name: str, default: T, descriptor: ParameterDescriptor) -> Callable[[], T]:
+        try:
+            self._node.declare_parameter(name, default, descriptor)
+        except InvalidParameterTypeException as err:
+            raise OptionError(
+                f"parameter {name!r} must be {_TYPES[type(default)]}, "
+                f"not {self._started_with(name)!r}."
+            ) from err
+        except InvalidParameterValueException as err:
+            raise OptionError(
+                f"parameter {name!r} must be {_allowed(descriptor)}, "
+                f"not {self._started_with(name)!r}."
+            ) from err
+        return lambda: cast(T, self._node.get_parameter(name).value)
+
+    def _started_with(self, name: str) -> Any:
+        # rclpy has no public way to see a value that it refused.
+        return self._node._parameter_overrides[name].value
+
+    def _refuse_other_choices(self, parameters: list[Parameter]) -> SetParametersResult:
+        for one in parameters:
+            choices = self._choices.get(one.name, ())
+            if choices and one.value not in choices:
+                return SetParametersResult(
+                    successful=False,
+                    reason=f"{one.name} must be one of {', '.join(choices)}, not {one.value!r}",
+                )
+        return SetParametersResult(successful=True)
+
+
+def _descriptor(description: str, fixed: bool) -> ParameterDescriptor:
+    return ParameterDescriptor(description=description, read_only=fixed)
+
+
+def _allowed(descriptor: ParameterDescriptor) -> str:
+    for span in (*descriptor.integer_range, *descriptor.floating_point_range):
+        return f"in [{span.from_value:g}, {span.to_value:g}]"
+    return str(descriptor.additional_constraints)

@@ -1,0 +1,282 @@
+"""The recorder: writes what a demonstrator does, and in which state, to durable recordings."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Final
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock, ROSClock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+from rclpy.validate_topic_name import validate_topic_name
+from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import SetBool, Trigger
+
+from rebt_ros.demonstration.builder import StateTopic
+from rebt_ros.demonstration.fields import fields_of
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.errors import OptionError
+from rebt_ros.ros import lifetime
+from rebt_ros.ros.arrival import ArrivalOrder
+from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
+from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
+from rebt_ros.storage.recording import RecordingWriter
+
+#: Long enough that no message of a burst is lost while a row is written.
+_QUEUE: Final = 1000
+
+#: A state topic is silent after this long without a message (seconds).
+_SILENT: Final = 2.0
+
+
+class RecorderNode(Node):
+    """Subscribes to states and actions, and writes one recording per demonstration.
+
+    Messages and service calls take effect in the order in which they were received, whatever the
+    order of their callbacks; so an action is recorded with the state that held when it came.
+
+    Raises:
+        OptionError: A parameter makes no sense.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("recorder")
+        declare = Parameters(self)
+        state_topics = declare.texts(
+            "state_topics", ["state"], "Float64MultiArray topics, in the order of their features."
+        )()
+        action_topics = declare.texts(
+            "action_topics", ["action"], "String topics; each is a channel of its own."
+        )()
+        fields = declare.texts(
+            "state_fields",
+            [],
+            "Names of the values of state topics, each entry as in 'state:front,left,right'; "
+            "where a topic has none, its messages' layout labels name them, else their index.",
+        )()
+        directory = declare.directory(
+            "demonstrations", "demonstrations", "Directory of the recordings; ~ is your home."
+        )()
+        sample_rate = declare.number(
+            "sample_rate",
+            0.0,
+            "Rows per second while an action holds; 0.0 for one row per action message.",
+            0.0,
+            1000.0,
+        )()
+        start = declare.flag("recording", True, "Whether to record from the start.")()
+        reliability = declare.text(
+            "state_qos",
+            "reliable",
+            "How to subscribe to states: sensor_data also hears best-effort publishers.",
+            choices=("reliable", "sensor_data"),
+        )()
+        window = declare.number(
+            "reorder_window",
+            0.05,
+            "How long to wait for messages that were received earlier (seconds).",
+            0.0,
+            1.0,
+        )()
+
+        def open_writer(features: tuple[Feature, ...]) -> Writer:
+            writer = RecordingWriter(
+                directory, features, action_topics, sample_rate=sample_rate or None
+            )
+            self.get_logger().info(f"recording to {writer.path}.")
+            return writer
+
+        self._faults = Faults(self.get_logger())
+        self._session = RecordingSession(
+            _state_topics(state_topics, fields),
+            action_topics,
+            sample_rate or None,
+            open_writer,
+            lambda kind, text: self._faults.note(kind, text, severe=kind == WRITE_ERROR),
+        )
+        self._check_names([*state_topics, *action_topics])
+        self._order = ArrivalOrder[Callable[[], object]](round(window * 1e9))
+        self._received = dict.fromkeys(state_topics, 0)
+        self._heard: dict[str, float] = {}
+        self._reported = time.monotonic()
+
+        states, actions = QoSProfile(depth=_QUEUE), QoSProfile(depth=_QUEUE)
+        if reliability == "sensor_data":
+            states.reliability = ReliabilityPolicy.BEST_EFFORT
+        self._sources: list[Subscription] = [
+            *(
+                self.create_subscription(
+                    Float64MultiArray, topic, partial(self._on_state, topic), states
+                )
+                for topic in state_topics
+            ),
+            *(
+                self.create_subscription(String, topic, partial(self._on_action, topic), actions)
+                for topic in action_topics
+            ),
+        ]
+        # Of their own, because their answers wait for the messages received before.
+        group = MutuallyExclusiveCallbackGroup()
+        for name, kind, command in (
+            ("~/record", SetBool, self._record),
+            ("~/new_demonstration", Trigger, lambda _, stamp: self._session.renew(stamp)),
+            ("~/discard_demonstration", Trigger, lambda _, stamp: self._session.discard(stamp)),
+        ):
+            self.create_service(kind, name, partial(self._serve, command), callback_group=group)
+        self._immediate = window == 0.0
+        if not self._immediate:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self.create_timer(max(window / 2, 0.005), self._take_ready, clock=steady)
+        self._diagnostics = Diagnostics(self, "recording", self._report)
+        if start:
+            self._session.start(self._stamp(time.time_ns()))
+        self.get_logger().info(
+            f"{'recording' if start else 'ready to record'} {', '.join(action_topics)} with "
+            f"{', '.join(state_topics)} to {directory.resolve()}."
+        )
+
+    def close(self) -> None:
+        """Writes what has been received, and ends the recording."""
+        self._take_waiting_messages()
+        for take in self._order.flush():
+            take()
+        if self._session.recording:
+            answer = self._session.stop()
+            log = self.get_logger().info if answer.success else self.get_logger().error
+            log(answer.message)
+
+    def _check_names(self, topics: Sequence[str]) -> None:
+        for topic in topics:
+            validate_topic_name(topic)
+        resolved = [self.resolve_topic_name(topic) for topic in topics]
+        for topic, name in zip(topics, resolved, strict=True):
+            if resolved.count(name) > 1:
+                raise OptionError(
+                    f"topic {topic!r} is {name}, which state_topics and action_topics name twice."
+                )
+
+    def _on_state(self, topic: str, message: Float64MultiArray, info: dict[str, Any]) -> None:
+        self._received[topic] += 1
+        self._heard[topic] = time.monotonic()
+        received = _received(info)
+        labels = fields_of([one.label for one in message.layout.dim], len(message.data))
+        stamp = self._stamp(received)
+        self._queue(received, partial(self._session.observe, stamp, topic, message.data, labels))
+
+    def _on_action(self, topic: str, message: String, info: dict[str, Any]) -> None:
+        received = _received(info)
+        self._queue(
+            received, partial(self._session.act, self._stamp(received), topic, message.data)
+        )
+
+    async def _serve(
+        self, command: Callable[[Any, int], Answer], request: Any, response: Any
+    ) -> Any:
+        done = Future()
+        now = time.time_ns()
+        stamp = self._stamp(now)
+        self._queue(now, lambda: done.set_result(command(request, stamp)))
+        answer = await done
+        self.get_logger().info(answer.message)
+        response.success, response.message = answer
+        return response
+
+    def _record(self, request: SetBool.Request, stamp: int) -> Answer:
+        return self._session.start(stamp) if request.data else self._session.stop()
+
+    def _queue(self, received: int, take: Callable[[], object]) -> None:
+        self._order.push(received, take, time.monotonic_ns())
+        if self._immediate:
+            self._take_ready()
+
+    def _take_ready(self) -> None:
+        now = time.monotonic_ns()
+        if not self._immediate:
+            self._take_waiting_messages()
+        for take in self._order.ready(now):
+            take()
+
+    def _take_waiting_messages(self) -> None:
+        """Fetches what was received and still waits for its callback.
+
+        On a busy machine the executor may come back late, with this timer first and with many
+        messages waiting; however long they wait, their order must not depend on it.
+        """
+        for source in self._sources:
+            with source.handle:
+                for _ in range(_QUEUE):
+                    taken = source.handle.take_message(source.msg_type, source.raw)
+                    if taken is None:
+                        break
+                    source.callback(*taken)
+
+    def _stamp(self, received: int) -> int:
+        """What a row says: time of reception, or simulated time where that is in use."""
+        clock = self.get_clock()
+        simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
+        return int(clock.now().nanoseconds) if simulated else received
+
+    def _report(self) -> Report:
+        now = time.monotonic()
+        elapsed, self._reported = now - self._reported, now
+        session = self._session
+        values: dict[str, object] = {
+            "rows": session.rows,
+            "rows lost": session.lost,
+            "demonstration": session.writer.path if session.writer else "none yet",
+            "rows of the demonstration": session.writer.rows if session.writer else 0,
+        }
+        for topic, count in self._received.items():
+            values[f"rate of {topic} (Hz)"] = f"{count / elapsed:.1f}" if elapsed else "unknown"
+            self._received[topic] = 0
+        values |= self._faults.counts
+        silent = [topic for topic in self._received if now - self._heard.get(topic, 0.0) > _SILENT]
+        if session.failure:
+            return Report(Level.ERROR, session.failure, values)
+        if not session.recording:
+            return Report(Level.OK, "not recording", values)
+        if self._faults.recent:
+            return Report(Level.WARN, self._faults.recent, values)
+        if silent:
+            return Report(Level.WARN, f"no messages on {', '.join(silent)}", values)
+        return Report(Level.OK, "recording", values)
+
+
+def _state_topics(names: Sequence[str], fields: Sequence[str]) -> list[StateTopic]:
+    """The state topics, with their fields where an entry "topic:field,field" gives them."""
+    named: dict[str, tuple[str, ...]] = {}
+    for entry in fields:
+        topic, colon, listed = entry.partition(":")
+        parts = tuple(one.strip() for one in listed.split(","))
+        if not colon or not all(parts):
+            raise OptionError(
+                f"parameter 'state_fields' has {entry!r}: write it as 'topic:field,field'."
+            )
+        if topic not in names or topic in named:
+            raise OptionError(
+                f"parameter 'state_fields' names {topic!r}, which state_topics "
+                f"{'does not name' if topic not in names else 'has fields for already'}."
+            )
+        named[topic] = parts
+    return [StateTopic(name, named.get(name, ())) for name in names]
+
+
+def _received(info: dict[str, Any]) -> int:
+    """When a message was received, nanoseconds; not every middleware says."""
+    return info.get("received_timestamp") or info.get("source_timestamp") or time.time_ns()
+
+
+def main(args: list[str] | None = None) -> None:
+    """Runs the recorder."""
+    lifetime.run(RecorderNode, args)
+
+
+if __name__ == "__main__":
+    main()

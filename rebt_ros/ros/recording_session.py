@@ -1,0 +1,241 @@
+"""What the recorder does with messages, without ROS: demonstrations, one file after another."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from rebt_ros.demonstration.builder import BadMessage, DemonstrationBuilder, StateTopic
+from rebt_ros.demonstration.demonstration import Row
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.errors import RebtError
+
+#: Kind of the fault that a row could not be written.
+WRITE_ERROR = "write error"
+
+#: Pause between attempts to open a file where writing failed (seconds).
+_RETRY_AFTER = 1.0
+
+
+class Writer(Protocol):
+    """A file of one demonstration; all methods raise `RebtError` where the disk does."""
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+
+    @property
+    def rows(self) -> int:
+        """How many rows it holds."""
+
+    def write(self, row: Row) -> None:
+        """Adds a row that is durable afterwards."""
+
+    def close(self) -> None:
+        """Ends the file."""
+
+    def discard(self) -> None:
+        """Removes the file."""
+
+
+class Answer(NamedTuple):
+    """A service's answer."""
+
+    success: bool
+    message: str
+
+
+class _Message(NamedTuple):
+    stamp: int
+    values: Sequence[float]
+    labels: Sequence[str]
+
+
+class RecordingSession:
+    """Turns messages into files, one per demonstration, opened at its first row.
+
+    Neither a bad message nor a full disk ends a session: the first is noted and left out; after
+    the second a new demonstration begins, in a new file, once there is room again.
+
+    Args:
+        topics: State topics, in the order of their features.
+        channels: Action topics.
+        sample_rate: Rows per second while an action holds; None for a row per action message.
+        open_writer: Opens the file of a demonstration with these features.
+        note: Told the kind and description of each fault.
+
+    Raises:
+        OptionError: See `DemonstrationBuilder`.
+    """
+
+    def __init__(
+        self,
+        topics: Sequence[StateTopic],
+        channels: Sequence[str],
+        sample_rate: float | None,
+        open_writer: Callable[[tuple[Feature, ...]], Writer],
+        note: Callable[[str, str], None],
+    ) -> None:
+        self._topics = tuple(topics)
+        self._channels = tuple(channels)
+        self._sample_rate = sample_rate
+        self._open_writer = open_writer
+        self._note = note
+        # Refuses topics and rates that no demonstration can have, before one begins.
+        DemonstrationBuilder(self._topics, self._channels, sample_rate)
+        self._latest: dict[str, _Message] = {}
+        self._held: dict[str, str] = {}
+        self._builder: DemonstrationBuilder | None = None
+        self._writer: Writer | None = None
+        self._retry_at = -math.inf
+        self.rows = 0
+        """Rows written in this session."""
+        self.lost = 0
+        """Rows that could not be written."""
+        self.failure = ""
+        """Why rows cannot be written at the moment; empty while they can."""
+
+    @property
+    def recording(self) -> bool:
+        """Whether actions become rows."""
+        return self._builder is not None
+
+    @property
+    def writer(self) -> Writer | None:
+        """The file of the demonstration under way, once that has a row."""
+        return self._writer
+
+    def observe(
+        self, stamp: int, topic: str, values: Sequence[float], labels: Sequence[str]
+    ) -> None:
+        """Takes a state message (see `DemonstrationBuilder.observe`)."""
+        before = self._latest.get(topic)
+        if not labels and before is not None and len(before.labels) == len(values):
+            # Some publishers name their fields in the first message only.
+            labels = before.labels
+        self._latest[topic] = _Message(stamp, values, labels)
+        if self._builder is not None:
+            with self._noting_faults():
+                self._write(self._builder.observe(stamp, topic, values, labels))
+
+    def act(self, stamp: int, channel: str, label: str) -> None:
+        """Takes an action message (see `DemonstrationBuilder.act`)."""
+        self._held[channel] = label
+        if self._builder is not None:
+            with self._noting_faults():
+                self._write(self._builder.act(stamp, channel, label))
+
+    def start(self, stamp: int) -> Answer:
+        """Begins to record, with a new demonstration."""
+        if self.recording:
+            return Answer(True, "already recording.")
+        self._begin(stamp)
+        return Answer(True, "recording: the demonstration's file is opened at its first action.")
+
+    def stop(self) -> Answer:
+        """Ends the demonstration and records no more."""
+        if not self.recording:
+            return Answer(True, "recording had stopped already.")
+        ended = self._end()
+        self._builder = None
+        return Answer(ended.success, f"stopped; {ended.message}")
+
+    def renew(self, stamp: int) -> Answer:
+        """Ends the demonstration and begins the next one."""
+        if not self.recording:
+            return Answer(False, "not recording: call ~/record with true first.")
+        ended = self._end()
+        self._begin(stamp)
+        return Answer(ended.success, f"{ended.message} A new demonstration has begun.")
+
+    def discard(self, stamp: int) -> Answer:
+        """Throws the demonstration under way away and begins the next one."""
+        if not self.recording:
+            return Answer(
+                False,
+                "not recording: a demonstration that has ended is a file that you can delete.",
+            )
+        writer, self._writer = self._writer, None
+        self._begin(stamp)
+        if writer is None:
+            return Answer(True, "there was no row to discard; a new demonstration has begun.")
+        try:
+            rows = writer.rows
+            writer.discard()
+        except RebtError as err:
+            return Answer(False, str(err))
+        self.rows -= rows
+        return Answer(
+            True, f"discarded {_count(rows)} in {writer.path}; a new demonstration has begun."
+        )
+
+    def _begin(self, stamp: int) -> None:
+        """Starts a demonstration that knows the present state, but none of the actions before."""
+        builder = DemonstrationBuilder(self._topics, self._channels, self._sample_rate)
+        for topic, (when, values, labels) in self._latest.items():
+            with contextlib.suppress(BadMessage):
+                builder.observe(when, topic, values, labels)
+        if self._sample_rate is not None:
+            for channel, label in self._held.items():
+                with contextlib.suppress(BadMessage):
+                    builder.act(stamp, channel, label)
+        self._builder = builder
+
+    def _end(self) -> Answer:
+        writer, self._writer = self._writer, None
+        if writer is None:
+            return Answer(True, "no rows were recorded.")
+        try:
+            writer.close()
+        except RebtError as err:
+            self.failure = str(err)
+            return Answer(False, str(err))
+        return Answer(True, f"recorded {_count(writer.rows)} in {writer.path}.")
+
+    @contextlib.contextmanager
+    def _noting_faults(self) -> Iterator[None]:
+        try:
+            yield
+        except BadMessage as err:
+            self._note(err.fault.value, str(err))
+
+    def _write(self, rows: Sequence[Row]) -> None:
+        for position, row in enumerate(rows):
+            if not self._written(row):
+                self.lost += len(rows) - position
+                # What comes after a gap is another demonstration: its LAT starts anew.
+                self._begin(row.stamp)
+                return
+
+    def _written(self, row: Row) -> bool:
+        try:
+            if self._writer is None:
+                if time.monotonic() < self._retry_at:
+                    return False
+                assert self._builder is not None
+                assert self._builder.features is not None
+                self._writer = self._open_writer(self._builder.features)
+            self._writer.write(row)
+        except RebtError as err:
+            self._abandon(str(err))
+            return False
+        self.rows += 1
+        self.failure = ""
+        return True
+
+    def _abandon(self, why: str) -> None:
+        writer, self._writer = self._writer, None
+        self._retry_at = time.monotonic() + _RETRY_AFTER
+        self.failure = why
+        self._note(WRITE_ERROR, why)
+        if writer is not None:
+            with contextlib.suppress(RebtError):
+                writer.close() if writer.rows else writer.discard()
+
+
+def _count(rows: int) -> str:
+    return f"{rows} row{'' if rows == 1 else 's'}"

@@ -1,0 +1,61 @@
+"""Files that are replaced as a whole: a reader sees the old text or the new one, never a part."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from pathlib import Path
+
+from rebt_ros.errors import RebtError
+
+
+class StorageError(RebtError):
+    """A file cannot be written."""
+
+
+def write_text_atomically(path: Path, text: str) -> None:
+    """Writes a UTF-8 file and its missing parent directories.
+
+    Args:
+        path: File to create or replace; a symbolic link is followed, not replaced.
+        text: Its whole content.
+
+    Raises:
+        StorageError: It could not be written; what was there before is untouched.
+    """
+    temporary: Path | None = None
+    try:
+        target = path.resolve()
+        target.parent.mkdir(parents=True, exist_ok=True)
+        # In the same directory, because a file cannot be renamed across file systems.
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}")
+        with temporary.open("x", encoding="utf-8", newline="") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(target)
+        sync_directory(target.parent)
+    except OSError as err:
+        raise StorageError(
+            f"{path} cannot be written ({err.strerror or err}): "
+            "name a place with room where you may write."
+        ) from err
+    finally:
+        # After success the temporary name is gone already.
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+
+
+def sync_directory(directory: Path) -> None:
+    """Makes the names of new files in a directory survive a power failure.
+
+    Raises:
+        OSError: The directory cannot be opened or written.
+    """
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,284 @@
+"""rosbag2 recordings as demonstrations (the only module that imports rosbags).
+
+The messages of a bag go through the same `DemonstrationBuilder` as those that the live recorder
+receives, so that the same messages give the same rows.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import chain
+from operator import itemgetter
+from pathlib import Path
+from textwrap import shorten
+from typing import Protocol, cast
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
+
+from rebt_ros.arrays import FloatArray
+from rebt_ros.demonstration.builder import BadMessage, DemonstrationBuilder, Fault, StateTopic
+from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.fields import fields_of
+from rebt_ros.errors import InputError, RebtError
+from rebt_ros.storage.read import Read
+from rebt_ros.storage.text import unreadable
+
+STATE_TYPE = "std_msgs/msg/Float64MultiArray"
+ACTION_TYPE = "std_msgs/msg/String"
+
+#: Names of the files that hold a bag's messages.
+STORAGE_SUFFIXES = (".mcap", ".db3")
+METADATA = "metadata.yaml"
+
+
+def read_bag(
+    path: Path,
+    *,
+    state_topics: Sequence[StateTopic] = (),
+    action_topics: Sequence[str] = (),
+    sample_rate: float | None = None,
+    skip_bad: bool = False,
+) -> Read:
+    """Reads a bag.
+
+    Args:
+        path: A bag's directory, or a single .mcap or .db3 file.
+        state_topics: Topics of the state, with or without their leading slash; by default the
+            only one of type std_msgs/msg/Float64MultiArray.
+        action_topics: Topics of the actions; by default the only one of type std_msgs/msg/String.
+        sample_rate: Rows per second and channel while an action holds; None: one row per action
+            message.
+        skip_bad: Leave out messages that cannot be used, and note how many, instead of refusing
+            the bag.  Actions before the first state are always left out.
+
+    Returns:
+        The rows that the recorder would have made from these messages.
+
+    Raises:
+        InputError: The bag cannot be read, lacks the topics or holds unusable messages.
+        OptionError: A topic is named twice, or the sample rate is not positive.
+    """
+    with _opened(path) as reader:
+        kinds = _topics(reader)
+        if not kinds:
+            raise InputError(f"{path} holds no messages: record state and action topics first.")
+        names = [one.name for one in state_topics]
+        states = _chosen(path, kinds, names, STATE_TYPE, "state")
+        actions = _chosen(path, kinds, action_topics, ACTION_TYPE, "action")
+        topics = (
+            [replace(one, name=name) for one, name in zip(state_topics, states, strict=True)]
+            if state_topics
+            else [StateTopic(name) for name in states]
+        )
+        builder = DemonstrationBuilder(topics, actions, sample_rate)
+        wanted = [one for one in reader.connections if one.topic in {*states, *actions}]
+        feed = _Feed(path, builder, skip_bad)
+        rows = (
+            row for message in _messages(path, reader, wanted) for row in feed.rows_of(*message)
+        )
+        first = next(rows, None)
+        if first is None or builder.features is None:
+            raise InputError(f"{path} gives no rows: {feed.why_no_rows(states, actions)}.")
+        demonstration = Demonstration.from_rows(
+            path.absolute().name, builder.features, chain((first,), rows)
+        )
+    return Read(demonstration, feed.notes())
+
+
+@dataclass(slots=True)
+class _Feed:
+    """Hands messages to the builder and counts those that it does not take."""
+
+    path: Path
+    builder: DemonstrationBuilder
+    skip_bad: bool
+    seen: Counter[str] = field(default_factory=Counter)
+    """Messages by topic."""
+    early: int = 0
+    """Actions before the first state."""
+    bad: list[str] = field(default_factory=list)
+    """What was wrong with the messages that were left out."""
+
+    def rows_of(self, connection: Connection, stamp: int, data: bytes) -> tuple[Row, ...]:
+        topic = connection.topic
+        self.seen[topic] += 1
+        try:
+            return _pushed(self.builder, connection, stamp, data)
+        except BadMessage as err:
+            if err.fault is Fault.NO_STATE:
+                self.early += 1
+                return ()
+            problem = InputError(f"{self.path}, message {self.seen[topic]} on {topic!r}: {err}")
+            problem.__cause__ = err
+        except _UndecodableError as err:
+            problem = InputError(
+                f"{self.path}, message {self.seen[topic]} on {topic!r} cannot be decoded as "
+                f"{connection.msgtype}: record the topic again."
+            )
+            problem.__cause__ = err
+        if not self.skip_bad:
+            raise problem
+        self.bad.append(str(problem))
+        return ()
+
+    def notes(self) -> tuple[str, ...]:
+        notes = []
+        if self.early:
+            notes.append(
+                f"left out: {_counted(self.early, 'action')} before the first message of every "
+                "state topic"
+            )
+        if self.bad:
+            notes.append(
+                f"left out: {_counted(len(self.bad), 'unusable message')}; "
+                f"the first: {self.bad[0].rstrip('.')}"
+            )
+        return tuple(notes)
+
+    def why_no_rows(self, states: Sequence[str], actions: Sequence[str]) -> str:
+        for topic in (*states, *actions):
+            if not self.seen[topic]:
+                return f"there is no message on {topic!r}; record it together with the others"
+        if self.early:
+            return "all actions came before the first state; start the state topics first"
+        return "no action has a label, or none is held until a sample is due; record longer ones"
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+class _UndecodableError(Exception):
+    """The bytes of a message are not one of its type."""
+
+
+class _Dimension(Protocol):
+    label: str
+
+
+class _Layout(Protocol):
+    dim: Sequence[_Dimension]
+
+
+class _Float64MultiArray(Protocol):
+    layout: _Layout
+    data: FloatArray
+
+
+class _String(Protocol):
+    data: str
+
+
+_TYPES = get_typestore(Stores.ROS2_JAZZY)
+
+
+def _pushed(
+    builder: DemonstrationBuilder, connection: Connection, stamp: int, data: bytes
+) -> tuple[Row, ...]:
+    """The rows that a message completes.
+
+    Raises:
+        BadMessage: The builder refuses it.
+        _UndecodableError: It cannot be decoded.
+    """
+    try:
+        message = _TYPES.deserialize_cdr(data, connection.msgtype)
+    except Exception as err:
+        # The generated decoders let whatever goes wrong inside them through.
+        raise _UndecodableError(str(err)) from err
+    if connection.msgtype == ACTION_TYPE:
+        return builder.act(stamp, connection.topic, cast(_String, message).data)
+    state = cast(_Float64MultiArray, message)
+    labels = fields_of([dimension.label for dimension in state.layout.dim], len(state.data))
+    return builder.observe(stamp, connection.topic, state.data.tolist(), labels)
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[Reader]:
+    with _explained(path):
+        reader = Reader(path)
+        reader.open()
+    try:
+        yield reader
+    finally:
+        reader.close()
+
+
+def _messages(
+    path: Path, reader: Reader, wanted: Sequence[Connection]
+) -> Iterator[tuple[Connection, int, bytes]]:
+    """The messages by the time at which they were recorded, those of one instant as they stand."""
+    with _explained(path):
+        messages = reader.messages(wanted)
+        # A directory's files come one after the other, and where the recorder went from one to
+        # the next their times may overlap.
+        yield from sorted(messages, key=itemgetter(1)) if path.is_dir() else messages
+
+
+@contextlib.contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Turns whatever a reader of damaged files may raise into one sentence."""
+    try:
+        yield
+    except RebtError:
+        raise
+    except Exception as err:  # of struct, apsw, zstd, YAML, ...: whatever the bytes provoke
+        raise _explanation(path, err) from err
+
+
+def _explanation(path: Path, err: Exception) -> InputError:
+    if not path.exists() or isinstance(err, PermissionError):
+        return unreadable(path, err if isinstance(err, OSError) else FileNotFoundError())
+    if path.is_dir() and not (path / METADATA).exists():
+        if any(one.suffix in STORAGE_SUFFIXES for one in path.iterdir()):
+            return InputError(f"{path} has no {METADATA}: run `ros2 bag reindex {path}` first.")
+        return InputError(f"{path} is not a bag: name a directory that `ros2 bag record` wrote.")
+    reason = shorten(str(err), 200).rstrip(".") or type(err).__name__
+    directory = path if path.is_dir() else path.parent
+    return InputError(
+        f"{path} is truncated, damaged or not a bag ({reason}): "
+        f"try `ros2 bag reindex {directory}`, or record it again."
+    )
+
+
+def _topics(reader: Reader) -> dict[str, str]:
+    """Type of each topic that has messages; empty where its publishers differ."""
+    return {
+        name: info.msgtype or "" for name, info in sorted(reader.topics.items()) if info.msgcount
+    }
+
+
+def _chosen(
+    path: Path, kinds: dict[str, str], names: Sequence[str], kind: str, role: str
+) -> tuple[str, ...]:
+    """The topics to read, by the names that the bag gives them."""
+    candidates = [topic for topic, its in kinds.items() if its == kind]
+    if not names and len(candidates) == 1:
+        return (candidates[0],)
+    if not names and candidates:
+        raise InputError(
+            f"{path} has {len(candidates)} topics of type {kind} ({', '.join(candidates)}): "
+            f"say which of them is the {role} topic."
+        )
+    there = ", ".join(f"{topic} ({its or 'several types'})" for topic, its in kinds.items())
+    if not names:
+        raise InputError(
+            f"{path} has no {role} topic: record one of type {kind}; there is {there}."
+        )
+    by_name = {topic.lstrip("/"): topic for topic in kinds}
+    topics = []
+    for name in names:
+        topic = by_name.get(name.lstrip("/"))
+        if topic is None:
+            raise InputError(f"{path} has no messages on {role} topic {name!r}: there is {there}.")
+        if kinds[topic] != kind:
+            raise InputError(
+                f"{path}: {role} topic {name!r} must be of type {kind}: there is {there}."
+            )
+        topics.append(topic)
+    return tuple(topics)

@@ -1,0 +1,153 @@
+"""Whatever a user names on the command line, as demonstrations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from rebt_ros.demonstration.builder import StateTopic
+from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.errors import InputError, OptionError
+from rebt_ros.storage.bag import METADATA, STORAGE_SUFFIXES, read_bag
+from rebt_ros.storage.csv_table import read_csv
+from rebt_ros.storage.read import Read
+from rebt_ros.storage.recording import is_recording, read_recording, recordings
+from rebt_ros.storage.text import unreadable
+
+
+@dataclass(frozen=True, slots=True)
+class InputOptions:
+    """How to read inputs; see `read_csv` and `read_bag` for what each means."""
+
+    label: str | None = None
+    """For CSV tables."""
+    header: bool = True
+    """For CSV tables."""
+    state_topics: tuple[StateTopic, ...] = ()
+    """For bags."""
+    action_topics: tuple[str, ...] = ()
+    """For bags."""
+    sample_rate: float | None = None
+    """For bags."""
+    skip_bad: bool = False
+    """For bags."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """What was read from all inputs."""
+
+    demonstrations: tuple[Demonstration, ...]
+    notes: tuple[str, ...]
+    """What a person should know, each led by the name of its demonstration."""
+
+
+class InputKind(Enum):
+    """What a file, or a directory that is one demonstration, is."""
+
+    TABLE = "CSV table"
+    RECORDING = "recording"
+    BAG = "bag"
+
+
+def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
+    """Reads demonstrations.
+
+    Args:
+        inputs: Bags (directories, .mcap or .db3 files), recordings, directories of recordings,
+            and CSV tables.
+        options: How to read them.
+
+    Returns:
+        All demonstrations, in the order of the inputs; those of a directory oldest first.
+
+    Raises:
+        InputError: There is no input, one is there twice, or one cannot be read.
+        OptionError: An option is for a kind of input that none is of.
+    """
+    options = options or InputOptions()
+    if not inputs:
+        raise InputError("there is no input: name a bag, a recording or a CSV table.")
+    sources = [source for path in inputs for source in _readable_sources(path)]
+    _check_distinct([path for path, _ in sources])
+    _check_options(options, {kind for _, kind in sources})
+    reads = [_READERS[kind](path, options) for path, kind in sources]
+    return Loaded(
+        tuple(read.demonstration for read in reads),
+        tuple(f"{read.demonstration.name}: {note}" for read in reads for note in read.notes),
+    )
+
+
+def _readable_sources(path: Path) -> tuple[tuple[Path, InputKind], ...]:
+    try:
+        return tuple(_sources(path))
+    except OSError as err:
+        raise unreadable(path, err) from err
+
+
+def _sources(path: Path) -> Iterator[tuple[Path, InputKind]]:
+    """The demonstrations that an input stands for."""
+    if not path.exists():
+        raise InputError(f"{path} does not exist: name a bag, a recording or a CSV table.")
+    if path.is_dir():
+        if (path / METADATA).exists() or any(
+            one.suffix in STORAGE_SUFFIXES for one in path.iterdir()
+        ):
+            yield path, InputKind.BAG
+        else:
+            yield from ((one, InputKind.RECORDING) for one in recordings(path))
+    elif path.suffix in STORAGE_SUFFIXES:
+        yield path, InputKind.BAG
+    else:
+        yield path, InputKind.RECORDING if is_recording(path) else InputKind.TABLE
+
+
+def _check_distinct(paths: Sequence[Path]) -> None:
+    seen: set[Path] = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise InputError(f"{path} is given twice: name every demonstration once.")
+        seen.add(path.resolve())
+
+
+def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
+    given = (
+        (options.label is not None, "a label column", InputKind.TABLE),
+        (not options.header, "the absence of a header", InputKind.TABLE),
+        (bool(options.state_topics), "a state topic", InputKind.BAG),
+        (bool(options.action_topics), "an action topic", InputKind.BAG),
+        (options.sample_rate is not None, "a sample rate", InputKind.BAG),
+        (options.skip_bad, "skipping of bad messages", InputKind.BAG),
+    )
+    for is_given, what, kind in given:
+        if is_given and kind not in kinds:
+            raise OptionError(
+                f"the options name {what}, but no input is a {kind.value}: leave that out."
+            )
+
+
+def _table(path: Path, options: InputOptions) -> Read:
+    return read_csv(path, label=options.label, header=options.header)
+
+
+def _recording(path: Path, _: InputOptions) -> Read:
+    return read_recording(path)
+
+
+def _bag(path: Path, options: InputOptions) -> Read:
+    return read_bag(
+        path,
+        state_topics=options.state_topics,
+        action_topics=options.action_topics,
+        sample_rate=options.sample_rate,
+        skip_bad=options.skip_bad,
+    )
+
+
+_READERS: dict[InputKind, Callable[[Path, InputOptions], Read]] = {
+    InputKind.TABLE: _table,
+    InputKind.RECORDING: _recording,
+    InputKind.BAG: _bag,
+}

@@ -1,0 +1,265 @@
+"""Real nodes in processes of their own, and a node in the test that talks to them.
+
+Nothing here sleeps for a fixed time: tests wait for a condition, with a limit.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
+from std_srvs.srv import SetBool, Trigger
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+#: How long a test waits for something that should happen at once, on a busy machine (seconds).
+PATIENCE = 30.0
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def wait_until(
+    condition: Callable[[], Any],
+    timeout: float = PATIENCE,
+    *,
+    meanwhile: Callable[[], object] = lambda: time.sleep(0.005),
+    what: str = "",
+) -> Any:
+    """Waits until the condition holds and returns its value.
+
+    Raises:
+        TimeoutError: It did not hold in time.
+    """
+    end = time.monotonic() + timeout
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > end:
+            raise TimeoutError(f"waited {timeout} s in vain for {what or condition}")
+        meanwhile()
+
+
+@contextmanager
+def own_domain() -> Iterator[int]:
+    """A ROS domain id that no other test on this machine uses at the same time."""
+    ids = list(range(1, 102))
+    random.SystemRandom().shuffle(ids)
+    for domain in ids:
+        with Path(tempfile.gettempdir(), f"rebt_ros_test_domain_{domain}.lock").open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            yield domain
+            return
+    raise RuntimeError("all ROS domains are in use")
+
+
+class NodeProcess:
+    """A node of the package in a process of its own.
+
+    Args:
+        module: Name of its module in `rebt_ros.ros`.
+        domain: ROS domain id.
+        directory: Its working directory; its logs and standard error go there.
+        parameters: Values of its parameters.
+        arguments: Further ROS arguments, such as remappings.
+    """
+
+    def __init__(
+        self,
+        module: str,
+        domain: int,
+        directory: Path,
+        parameters: Mapping[str, object] | None = None,
+        arguments: Sequence[str] = (),
+    ) -> None:
+        command = [sys.executable, "-m", f"rebt_ros.ros.{module}", "--ros-args"]
+        for name, value in (parameters or {}).items():
+            command += ["-p", f"{name}:={_yaml(value)}"]
+        environment = dict(
+            os.environ,
+            ROS_DOMAIN_ID=str(domain),
+            ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
+            ROS_LOG_DIR=str(directory / "log"),
+            PYTHONPATH=os.pathsep.join([str(CHECKOUT), os.environ.get("PYTHONPATH", "")]),
+        )
+        self._errors = directory / f"{module}.{time.monotonic_ns()}.stderr"
+        with self._errors.open("wb") as errors:
+            self.process = subprocess.Popen(
+                [*command, *arguments],
+                cwd=directory,
+                env=environment,
+                stdout=errors,
+                stderr=errors,
+            )
+
+    @property
+    def stderr(self) -> str:
+        """What it has written to standard error so far."""
+        return self._errors.read_text(errors="replace")
+
+    def says(self, text: str) -> None:
+        """Waits until it has logged the text."""
+        wait_until(lambda: text in self.stderr or self.process.poll() is not None, what=repr(text))
+        assert text in self.stderr, self.stderr
+
+    def catches(self, number: int) -> None:
+        """Waits until it has a handler for the signal."""
+        status = Path(f"/proc/{self.process.pid}/status")
+
+        def caught() -> int:
+            line = next(one for one in status.read_text().splitlines() if "SigCgt" in one)
+            return int(line.split()[1], 16) >> (number - 1) & 1
+
+        wait_until(caught, meanwhile=lambda: None)
+
+    def stop(self, number: int = signal.SIGINT) -> int:
+        """Sends a signal and waits for the end.
+
+        Returns:
+            The exit code.
+        """
+        self.process.send_signal(number)
+        return self.process.wait(PATIENCE)
+
+    def wait(self) -> int:
+        """Waits for its end by itself; returns the exit code."""
+        return self.process.wait(PATIENCE)
+
+    def __enter__(self) -> NodeProcess:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        if kind is not None:
+            print(f"--- {self._errors.name}\n{self.stderr}")
+
+
+def _yaml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_yaml, value))}]"
+    return f"'{value}'" if isinstance(value, (str, Path)) else str(value)
+
+
+class Peer:
+    """The test's own node: publishes, listens and calls services.
+
+    Args:
+        domain: ROS domain id.
+    """
+
+    def __init__(self, domain: int) -> None:
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=domain)
+        self.node = Node("test_peer", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._publishers: dict[str, Any] = {}
+        self._clients: dict[str, Any] = {}
+        self.diagnostics: dict[str, Any] = {}
+        """The latest status by the name of its source."""
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._note, 10)
+
+    def close(self) -> None:
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def __enter__(self) -> Peer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def spin_once(self) -> None:
+        self._executor.spin_once(timeout_sec=0.01)
+
+    def wait_until(
+        self, condition: Callable[[], Any], timeout: float = PATIENCE, what: str = ""
+    ) -> Any:
+        """Takes messages until the condition holds, and returns its value."""
+        return wait_until(condition, timeout, meanwhile=self.spin_once, what=what)
+
+    def connect(self, kind: type, topic: str, qos: Any = 1000) -> Any:
+        """A publisher that has a subscriber."""
+        if topic not in self._publishers:
+            self._publishers[topic] = self.node.create_publisher(kind, topic, qos)
+        publisher = self._publishers[topic]
+        self.wait_until(publisher.get_subscription_count, what=f"a subscriber of {topic}")
+        return publisher
+
+    def state(
+        self, *values: float, topic: str = "state", labels: Sequence[str] = ()
+    ) -> Float64MultiArray:
+        message = Float64MultiArray(data=list(values))
+        message.layout.dim = [MultiArrayDimension(label=label) for label in labels]
+        self._send(Float64MultiArray, topic, message)
+        return message
+
+    def action(self, label: str, topic: str = "action") -> None:
+        self._send(String, topic, String(data=label))
+
+    def _send(self, kind: type, topic: str, message: Any) -> None:
+        first = topic not in self._publishers
+        publisher = self.connect(kind, topic)
+        publisher.publish(message)
+        if first:
+            # A subscriber that is known here may not know of this publisher yet: until it does,
+            # it takes messages late, and those of another topic before them.
+            publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
+
+    def listen(self, kind: type, topic: str, qos: Any = 1000) -> list[Any]:
+        """A list to which the messages of a topic are added."""
+        heard: list[Any] = []
+        self.node.create_subscription(kind, topic, heard.append, qos)
+        self.wait_until(lambda: self.node.count_publishers(topic), what=f"a publisher of {topic}")
+        return heard
+
+    def begin(self, service: str, data: bool | None = None) -> Any:
+        """Calls a service; returns the future of its answer."""
+        kind = Trigger if data is None else SetBool
+        if service not in self._clients:
+            self._clients[service] = self.node.create_client(kind, service)
+        client = self._clients[service]
+        self.wait_until(client.service_is_ready, what=service)
+        return client.call_async(kind.Request() if data is None else kind.Request(data=data))
+
+    def call(self, service: str, data: bool | None = None, timeout: float = PATIENCE) -> Any:
+        """Calls a service and waits for its answer."""
+        future = self.begin(service, data)
+        self.wait_until(future.done, timeout, what=f"the answer of {service}")
+        return future.result()
+
+    def _note(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self.diagnostics[status.name] = status
+
+
+def values_of(status: Any) -> dict[str, str]:
+    """The values of a diagnostic status."""
+    return {one.key: one.value for one in status.values}

@@ -1,0 +1,257 @@
+"""The layers of the package, as rules that fail.
+
+Every module's imports are read from its syntax tree, also those inside functions and those for
+type checkers, so that a rule holds on paths which no test takes.
+"""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+PACKAGE: Final = "rebt_ros"
+CHECKOUT: Final = Path(__file__).resolve().parents[1]
+
+#: From the top down.  A module imports from its own unit and from lower layers; the units that
+#: share a layer know nothing of each other.
+LAYERS: Final = (
+    {"commands"},
+    {"ros"},
+    {PACKAGE},  # rebt_ros/__init__.py, the public interface
+    {"offline"},
+    {"pipeline", "replay"},
+    {"evaluation", "simulation", "storage"},
+    {"algorithms"},
+    {"decision_tree"},
+    {"behavior_tree"},
+    {"demonstration"},
+    {"logic"},
+    {"errors", "arrays"},
+)
+DEPTH: Final = {unit: depth for depth, units in enumerate(LAYERS) for unit in units}
+
+#: Top-level packages of ROS, and the modules that may know them.
+ROS: Final = frozenset(
+    {
+        "action_msgs",
+        "ament_index_python",
+        "builtin_interfaces",
+        "diagnostic_msgs",
+        "launch",
+        "launch_ros",
+        "rcl_interfaces",
+        "rclpy",
+        "ros2cli",
+        "rosidl_runtime_py",
+        "std_msgs",
+        "std_srvs",
+    }
+)
+ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
+
+#: Libraries with a home: the only modules that import them.
+HOMES: Final = {
+    "jsonschema": ("rebt_ros.behavior_tree.document",),
+    "py_trees": ("rebt_ros.behavior_tree.runtime", "rebt_ros.ros", "rebt_ros.ros.*"),
+    "pyeda": ("rebt_ros.logic.minimize",),
+    "rosbags": ("rebt_ros.storage", "rebt_ros.storage.*"),
+    "scipy": (),
+    "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
+}
+
+#: Run code that comes from data, or read formats that do.
+DANGEROUS_NAMES: Final = frozenset({"eval", "exec", "__import__"})
+DANGEROUS_MODULES: Final = frozenset({"dill", "joblib", "marshal", "pickle", "shelve"})
+
+
+@dataclass(frozen=True)
+class Module:
+    """A module of the package."""
+
+    name: str
+    path: Path
+
+    @property
+    def unit(self) -> str:
+        """The subpackage or top-level module that it belongs to."""
+        parts = self.name.split(".")
+        return parts[1] if len(parts) > 1 else PACKAGE
+
+    @property
+    def is_core(self) -> bool:
+        return self.unit not in {"commands", "ros"}
+
+    @property
+    def tree(self) -> ast.Module:
+        return _parsed(self.path)
+
+    @property
+    def imports(self) -> Iterator[tuple[int, str]]:
+        """Line and absolute dotted name of everything that is imported.
+
+        ``from a import b`` is ``a.b``, whether b is a module or not.
+        """
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Import):
+                yield from ((node.lineno, alias.name) for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                base = self._absolute(node)
+                yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
+
+    def _absolute(self, node: ast.ImportFrom) -> str:
+        if not node.level:
+            return node.module or ""
+        parents = self.name.split(".")
+        if self.path.name != "__init__.py":
+            parents = parents[:-1]
+        parents = parents[: len(parents) - (node.level - 1)]
+        return ".".join([*parents, node.module] if node.module else parents)
+
+    def is_one_of(self, patterns: tuple[str, ...]) -> bool:
+        return any(fnmatch(self.name, pattern) for pattern in patterns)
+
+    def __str__(self) -> str:
+        return str(self.path.relative_to(CHECKOUT))
+
+
+@cache
+def _parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
+def _module(path: Path) -> Module:
+    parts = list(path.relative_to(CHECKOUT).with_suffix("").parts)
+    return Module(".".join(parts[:-1] if parts[-1] == "__init__" else parts), path)
+
+
+MODULES: Final = [_module(path) for path in sorted((CHECKOUT / PACKAGE).rglob("*.py"))]
+CORE: Final = [module for module in MODULES if module.is_core]
+
+
+def _unit_of(name: str) -> str | None:
+    """The unit of an imported name; None where it is not ours."""
+    parts = name.split(".")
+    if parts[0] != PACKAGE:
+        return None
+    # ``from rebt_ros import learn`` takes a name from the public interface.
+    return parts[1] if len(parts) > 1 and _is_unit(parts[1]) else PACKAGE
+
+
+def _is_unit(name: str) -> bool:
+    source = CHECKOUT / PACKAGE / name
+    return source.is_dir() or source.with_suffix(".py").is_file()
+
+
+def _run(code: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=CHECKOUT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_there_are_modules_to_look_at() -> None:
+    assert {"logic", "ros", "commands"} <= {module.unit for module in MODULES}
+
+
+def test_every_module_has_a_layer() -> None:
+    assert [str(module) for module in MODULES if module.unit not in DEPTH] == []
+
+
+def test_imports_go_downwards_only() -> None:
+    upwards = [
+        f"{module}:{line}: {module.unit} imports {name}"
+        for module in MODULES
+        for line, name in module.imports
+        if (unit := _unit_of(name)) is not None
+        and unit != module.unit
+        and DEPTH.get(unit, 0) <= DEPTH.get(module.unit, 0)
+    ]
+    assert upwards == []
+
+
+def test_only_the_shells_know_ros() -> None:
+    strays = [
+        f"{module}:{line}: {name}"
+        for module in MODULES
+        for line, name in module.imports
+        if name.split(".")[0] in ROS and not module.is_one_of(ROS_HOMES)
+    ]
+    assert strays == []
+
+
+@pytest.mark.parametrize("library", sorted(HOMES))
+def test_a_library_is_imported_in_its_home_only(library: str) -> None:
+    strays = [
+        f"{module}:{line}: {name}"
+        for module in MODULES
+        for line, name in module.imports
+        if name.split(".")[0] == library and not module.is_one_of(HOMES[library])
+    ]
+    assert strays == []
+
+
+def test_no_data_is_run_as_code() -> None:
+    assert [
+        f"{module}:{line}: {what}" for module in MODULES for line, what in _dangers(module)
+    ] == []
+
+
+def _dangers(module: Module) -> Iterator[tuple[int, str]]:
+    for line, name in module.imports:
+        if name.split(".")[0] in DANGEROUS_MODULES:
+            yield line, name
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Name) and node.id in DANGEROUS_NAMES:
+            yield node.lineno, node.id
+        elif (
+            isinstance(node, ast.Attribute)
+            and isinstance(node.value, ast.Name)
+            and (node.value.id, node.attr) in {("yaml", "load"), ("yaml", "unsafe_load")}
+        ):
+            yield node.lineno, f"yaml.{node.attr}"
+
+
+def test_the_core_prints_nothing() -> None:
+    printing = [
+        f"{module}:{node.lineno}"
+        for module in CORE
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.Name) and node.id == "print"
+    ]
+    assert printing == []
+
+
+#: A module that is None in sys.modules cannot be imported, as if it were not installed.
+WITHOUT_ROS: Final = f"import importlib, sys; sys.modules.update(dict.fromkeys({sorted(ROS)}));"
+
+
+def test_the_core_runs_where_ros_is_not_installed() -> None:
+    names = [module.name for module in CORE]
+    _run(f"{WITHOUT_ROS} [importlib.import_module(name) for name in {names}]")
+
+
+@pytest.mark.parametrize("command", ["learn", "replay"])
+def test_offline_commands_need_no_ros(command: str) -> None:
+    _run(f"{WITHOUT_ROS} importlib.import_module('rebt_ros.commands.{command}')")
+
+
+@pytest.mark.parametrize("node", ["recorder_node", "executor_node"])
+def test_nodes_of_the_robot_load_nothing_that_only_learning_needs(node: str) -> None:
+    loaded = _run(f"import sys, rebt_ros.ros.{node}; print(*sys.modules)").split()
+    heavy = {"jsonschema", "pyeda", "rosbags", "scipy", "sklearn"}
+    assert heavy & {name.split(".")[0] for name in loaded} == set()

@@ -1,0 +1,108 @@
+"""Conditions, literals and conjunctions as values."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import strategies as some
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rebt_ros.logic.conditions import (
+    KNOWN,
+    HasCategory,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    Threshold,
+    deciding,
+)
+from rebt_ros.logic.dnf import FALSE, TRUE, Conjunction, Dnf, conditions_of
+
+NEAR = some.at_most("distance", 0.3)
+DOCKED = Literal(IsTrue("docked"))
+CUP = Literal(HasCategory("kind", "cup"))
+AFTER_GO = Literal(LastActionIs("go"))
+
+
+@given(some.literals())
+def test_the_negation_of_the_negation_is_the_literal(literal: Literal) -> None:
+    assert ~~literal == literal
+    assert ~literal != literal
+    assert (~literal).condition == literal.condition
+
+
+@given(some.literals(), some.states, st.none() | st.sampled_from(some.LABELS))
+def test_of_a_literal_and_its_negation_exactly_one_holds(
+    literal: Literal, state: tuple[float, ...], last: str | None
+) -> None:
+    # A missing value makes every condition false, and so its negation true.
+    assert some.holds(literal, state, last) is not some.holds(~literal, state, last)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_threshold_is_finite(value: float) -> None:
+    with pytest.raises(ValueError, match="'distance' must be finite"):
+        Threshold("distance", value)
+
+
+def test_the_threshold_above_all_values_is_the_largest_double() -> None:
+    assert math.nextafter(KNOWN, math.inf) == math.inf
+    assert Threshold("distance", KNOWN).value == KNOWN
+
+
+@given(some.conjunctions(max_size=6))
+def test_a_conjunction_refuses_a_condition_that_it_already_has(conjunction: Conjunction) -> None:
+    for literal in conjunction:
+        for again in (literal, ~literal):
+            with pytest.raises(ValueError, match="names each condition once"):
+                Conjunction((*conjunction.literals, again))
+
+
+@given(some.conjunctions(max_size=6), st.sets(some.literals()))
+def test_without_removes_the_given_literals_and_keeps_the_order(
+    conjunction: Conjunction, unwanted: set[Literal]
+) -> None:
+    rest = conjunction.without(frozenset(unwanted))
+    assert rest.literals == tuple(one for one in conjunction if one not in unwanted)
+
+
+@given(some.literals(), st.lists(st.sampled_from(some.LABELS)).map(tuple))
+def test_only_literals_about_lat_learn_what_is_decided(
+    literal: Literal, actions: tuple[str, ...]
+) -> None:
+    meant = deciding(literal, actions)
+    if isinstance(literal.condition, LastActionIs):
+        asked = LastActionIs(literal.condition.action, actions)
+        assert meant == Literal(asked, literal.positive)
+    else:
+        assert meant == literal
+
+
+def test_lat_conditions_of_different_rules_are_different_conditions() -> None:
+    assert LastActionIs("go", ("turn",)) != LastActionIs("go", ("wait",))
+    assert LastActionIs("go", ("turn",)) != LastActionIs("go")
+    both = some.conjunction(deciding(AFTER_GO, ("turn",)), deciding(AFTER_GO, ("wait",)))
+    assert len(both) == 2
+
+
+@pytest.mark.parametrize(
+    ("rule", "is_true"),
+    [
+        (TRUE, True),
+        (FALSE, False),
+        (some.dnf([NEAR]), False),
+        (some.dnf([NEAR], []), True),
+        # True for a thinker, not for the property: it only looks for an empty conjunction.
+        (some.dnf([NEAR], [~NEAR]), False),
+    ],
+)
+def test_is_true_finds_a_conjunction_without_literals(rule: Dnf, is_true: bool) -> None:
+    assert rule.is_true is is_true
+
+
+def test_conditions_are_listed_once_in_the_order_in_which_they_occur() -> None:
+    rule = some.dnf([CUP, ~NEAR], [NEAR, DOCKED], [~CUP])
+    assert conditions_of(rule) == (CUP.condition, NEAR.condition, DOCKED.condition)
+    assert conditions_of(TRUE) == conditions_of(FALSE) == ()

@@ -1,0 +1,243 @@
+"""CSV tables: kinds of columns, missing values, headers, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.errors import InputError
+from rebt_ros.storage.csv_table import read_csv
+
+SHARED = Path(__file__).resolve().parents[1].parent / "shared"
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Writes text to a file and returns its path."""
+
+    def write(text: str | bytes) -> Path:
+        path = tmp_path / "table.csv"
+        path.write_bytes(text.encode() if isinstance(text, str) else text)
+        return path
+
+    return write
+
+
+def labels(demonstration):
+    return [demonstration.actions[code] for code in demonstration.chosen]
+
+
+def test_numbers_text_and_truth_values_become_columns_of_their_kind(table):
+    read = read_csv(table("x,on,where,action\n1.5,True,hall,go\n-2,false,kitchen,turn\n"))
+    shown = read.demonstration
+    assert [(one.name, one.kind) for one in shown.features] == [
+        ("x", FeatureKind.NUMERIC),
+        ("on", FeatureKind.BINARY),
+        ("where", FeatureKind.CATEGORICAL),
+    ]
+    assert shown.features[2].categories == ("hall", "kitchen")
+    assert shown.states.tolist() == [[1.5, 1, 0], [-2, 0, 1]]
+    assert labels(shown) == ["go", "turn"]
+    assert shown.channels == (DEFAULT_CHANNEL,)
+    assert shown.name == "table.csv"
+    assert shown.stamps.tolist() == [0, 1]
+    assert read.notes == ()
+
+
+def test_an_empty_cell_is_a_missing_value(table):
+    shown = read_csv(table("x,where,a\n,,go\n1,hall,turn\n  ,hall,go\n")).demonstration
+    np.testing.assert_array_equal(shown.states, [[np.nan, np.nan], [1.0, 0.0], [np.nan, 0.0]])
+    assert shown.features[0].kind is FeatureKind.NUMERIC
+
+
+def test_truth_with_gaps_is_categorical_because_a_binary_value_is_never_missing(table):
+    shown = read_csv(table("on,a\nTrue,go\n,turn\nfalse,go\n")).demonstration
+    assert shown.features[0].kind is FeatureKind.CATEGORICAL
+    assert shown.features[0].categories == ("False", "True")
+    np.testing.assert_array_equal(shown.states[:, 0], [1, np.nan, 0])
+
+
+def test_spellings_of_truth_are_one_category_each(table):
+    shown = read_csv(table("on,a\nTrue,go\n1,turn\n0,go\nFALSE,go\n")).demonstration
+    assert shown.features[0].categories == ("False", "True")
+    assert shown.states[:, 0].tolist() == [1, 1, 0, 0]
+
+
+def test_zeros_and_ones_are_numbers(table):
+    shown = read_csv(table("on,a\n1,go\n0,turn\n")).demonstration
+    assert shown.features[0].kind is FeatureKind.NUMERIC
+
+
+def test_a_column_of_numbers_with_one_word_in_it_is_noted(table):
+    read = read_csv(table("x,a\n1,go\n2,go\nn/a,turn\n"))
+    assert read.demonstration.features[0].categories == ("1", "2", "n/a")
+    assert read.notes == (
+        "column 'x' is taken as text, not as numbers, because line 4 holds 'n/a'",
+    )
+
+
+@pytest.mark.parametrize("cell", ["1_000", "١"])
+def test_only_what_every_tool_reads_as_a_number_is_one(table, cell):
+    shown = read_csv(table(f"x,a\n{cell},go\n{cell},turn\n")).demonstration
+    assert shown.features[0].categories == (cell,)
+
+
+@pytest.mark.parametrize("cell", ["nan", "inf", "-Infinity", "1e39", "-1e400"])
+def test_a_number_that_is_not_finite_or_too_large_is_refused_with_its_place(table, cell):
+    with pytest.raises(InputError, match=rf"line 3: column 'y' holds '{cell}'"):
+        read_csv(table(f"x,y,a\n1,2,go\n1,{cell},turn\n"))
+
+
+def test_rows_without_an_action_are_left_out_with_one_note(table):
+    read = read_csv(table("x,a\n1,go\n2,\n3, \n4,turn\n"))
+    assert read.demonstration.states[:, 0].tolist() == [1, 4]
+    assert read.demonstration.stamps.tolist() == [0, 3]
+    assert read.notes == ("2 of 4 rows have no action and are left out",)
+
+
+def test_the_label_column_may_stand_anywhere(table):
+    shown = read_csv(table("x,act,y\n1,go,2\n3,turn,4\n"), label="act").demonstration
+    assert [one.name for one in shown.features] == ["x", "y"]
+    assert labels(shown) == ["go", "turn"]
+
+
+def test_a_label_keeps_its_text_exactly(table):
+    text = 'x,a\n1, go \n2,"say ""hi"", twice"\n3,007\n'
+    assert labels(read_csv(table(text)).demonstration) == [" go ", 'say "hi", twice', "007"]
+
+
+def test_an_unknown_label_column_is_refused_with_the_columns_there_are(table):
+    with pytest.raises(InputError, match="no column 'nope': the columns are x, y, a"):
+        read_csv(table("x,y,a\n1,2,go\n"), label="nope")
+
+
+def test_only_the_first_columns_are_listed(table):
+    header = ",".join(f"c{index}" for index in range(20))
+    with pytest.raises(InputError, match=r"c0, c1, c2, c3, c4, c5, c6, c7, \.\.\.\.$"):
+        read_csv(table(header + "\n" + ",".join("1" * 20) + "\n"), label="nope")
+
+
+@pytest.mark.parametrize("label", [None, "x2", "2"])
+def test_columns_without_a_header_are_named_by_their_index(table, label):
+    shown = read_csv(table("1,2,go\n3,4,turn\n"), label=label, header=False).demonstration
+    assert [one.name for one in shown.features] == ["x0", "x1"]
+    assert len(shown) == 2
+
+
+def test_a_first_line_of_numbers_is_data_with_a_note(table):
+    read = read_csv(table("0.4,3.5,go\n0.5,3.5,turn\n"))
+    assert read.demonstration.states.tolist() == [[0.4, 3.5], [0.5, 3.5]]
+    assert read.notes == ("the first line holds data, so the columns are named x0, x1, and so on",)
+
+
+def test_indices_as_column_names_are_a_header(table):
+    shown = read_csv(table("0,1,action\n5,6,go\n7,8,turn\n")).demonstration
+    assert [one.name for one in shown.features] == ["0", "1"]
+    assert labels(shown) == ["go", "turn"]
+
+
+def test_a_first_row_that_looks_like_indices_is_data_when_its_action_recurs(table):
+    assert len(read_csv(table("0,1,go\n5,6,go\n7,8,turn\n")).demonstration) == 3
+
+
+def test_a_header_that_was_declared_absent_is_refused(table):
+    with pytest.raises(InputError, match="the first line says 'x' above a column of numbers"):
+        read_csv(table("x,y,a\n1,2,go\n3,4,turn\n"), header=False)
+
+
+def test_a_stamp_column_of_integers_is_the_stamp(table):
+    shown = read_csv(table("stamp,x,a\n1700000000000000001,1,go\n1700000000000000002,2,go\n"))
+    assert [one.name for one in shown.demonstration.features] == ["x"]
+    assert shown.demonstration.stamps.tolist() == [1700000000000000001, 1700000000000000002]
+
+
+def test_a_stamp_column_of_other_values_is_a_feature_with_a_note(table):
+    read = read_csv(table("stamp,x,a\n0.5,1,go\n0.6,2,go\n"))
+    assert [one.name for one in read.demonstration.features] == ["stamp", "x"]
+    assert "does not hold integers" in read.notes[0]
+
+
+def test_byte_order_mark_line_ends_and_blank_lines_do_not_matter(table):
+    shown = read_csv(table(b"\xef\xbb\xbfx,a\r\n\r\n1,go\r\n2,turn\r\n\r\n")).demonstration
+    assert [one.name for one in shown.features] == ["x"]
+    assert labels(shown) == ["go", "turn"]
+
+
+def test_line_numbers_count_line_breaks_inside_cells(table):
+    with pytest.raises(InputError, match="line 5: column 'y' holds 'nan'"):
+        read_csv(table('x,y,a\n"two\nlines",1,go\n\nb,nan,go\n'))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty"),
+        ("\n\n", "is empty"),
+        ("x,a\n", "has no rows"),
+        ("x,a\n1,\n2,\n", "column 'a' holds no action"),
+        ("x,y,a\n1,2,go\n1,go\n", "line 3: there are 2 cells where 3 were expected"),
+        ("x,y,a\n1,2,go\n1,2,3,go\n", "line 3: there are 4 cells where 3 were expected"),
+        ("x,x,a\n1,2,go\n", "two columns are named 'x'"),
+        (",x,a\n0,2,go\n", "column 1 has no name"),
+        ("x;a\n1;go\n", "single column"),
+        ("stamp,a\n1,go\n", "no column beside the actions"),
+        ('x,a\n1,"go\n', "line 2: this is not CSV"),
+        ('x,a\n1,"go\nup"\n', "line 2: the action .* printable"),
+        (b"x,a\n1,go\n1,\xff\n", "line 3: this is not UTF-8"),
+        (b"x,a\n1,g\0o\n", "not a text file"),
+    ],
+)
+def test_what_is_no_table_is_refused_with_one_sentence(table, text, message):
+    with pytest.raises(InputError, match=message) as caught:
+        read_csv(table(text))
+    assert str(caught.value).endswith(".")
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_files_and_directories_are_refused(tmp_path):
+    with pytest.raises(InputError, match="does not exist"):
+        read_csv(tmp_path / "nothing.csv")
+    with pytest.raises(InputError, match="is a directory"):
+        read_csv(tmp_path)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(-1e38, 1e38), st.sampled_from(["go", "turn, left", 'say "hi"', "über"])
+        ),
+        min_size=1,
+        max_size=20,
+    )
+)
+def test_every_bit_of_a_number_and_every_label_survives(tmp_path_factory, rows):
+    import csv
+
+    path = tmp_path_factory.mktemp("csv") / "table.csv"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([("x", "a"), *((repr(x), label) for x, label in rows)])
+    shown = read_csv(path).demonstration
+    assert shown.states[:, 0].tobytes() == np.array([x for x, _ in rows]).tobytes()
+    assert labels(shown) == [label for _, label in rows]
+
+
+@pytest.mark.skipif(not SHARED.exists(), reason="third-party data is not beside the checkout")
+class TestRealData:
+    def test_the_robot_tutor(self):
+        read = read_csv(SHARED / "data" / "tutor.csv", label="/robot_dialogue")
+        assert read.notes == ("186 of 1000 rows have no action and are left out",)
+        assert len(read.demonstration) == 814
+        kinds = {one.name: one.kind for one in read.demonstration.features}
+        assert kinds["/ExerciseSubmissionResult"] is FeatureKind.CATEGORICAL
+        assert kinds["/IsNewExercise"] is FeatureKind.BINARY
+        assert kinds["/KC"] is FeatureKind.NUMERIC
+
+    def test_the_wall_following_robot_needs_no_options(self):
+        read = read_csv(SHARED / "data" / "scitos_g5_24.csv")
+        assert read.demonstration.states.shape == (5456, 24)
+        assert len(read.demonstration.actions) == 4
+        assert "holds data" in read.notes[0]

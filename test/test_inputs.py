@@ -1,0 +1,214 @@
+"""Inputs by what they are, and files that are replaced as a whole."""
+
+import os
+import stat
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import Writer
+from rosbags.typesys import Stores, get_typestore
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
+from rebt_ros.demonstration.builder import StateTopic
+from rebt_ros.demonstration.demonstration import Row
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.errors import DocumentError, InputError, OptionError
+from rebt_ros.storage import atomic
+from rebt_ros.storage.atomic import StorageError, write_text_atomically
+from rebt_ros.storage.inputs import InputOptions, load
+from rebt_ros.storage.recording import RecordingWriter
+from rebt_ros.storage.tree_file import read_tree, write_tree
+
+STATE = "std_msgs/msg/Float64MultiArray"
+ACTION = "std_msgs/msg/String"
+
+
+def write_table(path: Path) -> Path:
+    path.write_text("x,action,y\n1,go,2\n3,turn,4\n5,,6\n")
+    return path
+
+
+def write_recording(directory: Path) -> Path:
+    with RecordingWriter(directory, (Feature("x", topic="/s", index=0),), ["/a"]) as writer:
+        writer.write(Row(1, "/a", "go", None, (1.0,)))
+    return writer.path
+
+
+def write_bag(path: Path) -> Path:
+    types = get_typestore(Stores.ROS2_JAZZY)
+    layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+    state = types.types[STATE](layout=layout, data=np.array([1.0]))
+    with Writer(path, version=9) as writer:
+        states = writer.add_connection("/s", STATE, typestore=types)
+        actions = writer.add_connection("/a", ACTION, typestore=types)
+        go = types.serialize_cdr(types.types[ACTION](data="go"), ACTION)
+        writer.write(states, 1, types.serialize_cdr(state, STATE))
+        writer.write(actions, 2, go)
+        writer.write(states, 3, types.serialize_cdr(state, STATE))
+    return path
+
+
+def names(loaded):
+    return [one.name for one in loaded.demonstrations]
+
+
+def test_every_input_is_read_as_what_it_is(tmp_path):
+    table = write_table(tmp_path / "table.csv")
+    single = write_recording(tmp_path / "single")
+    several = [write_recording(tmp_path / "several") for _ in range(3)]
+    bag = write_bag(tmp_path / "bag")
+    other = write_bag(tmp_path / "other")
+    loaded = load(
+        [table, tmp_path / "several", bag, single, other / "other.db3"],
+        InputOptions(label="action", state_topics=(StateTopic("s", ("front",)),)),
+    )
+    assert names(loaded) == [
+        "table.csv",
+        *(path.name for path in several),
+        "bag",
+        single.name,
+        "other.db3",
+    ]
+    assert [len(one) for one in loaded.demonstrations] == [2, 1, 1, 1, 1, 1, 1]
+    assert [one.name for one in loaded.demonstrations[0].features] == ["x", "y"]
+    assert [one.name for one in loaded.demonstrations[4].features] == ["front"]
+
+
+def test_notes_say_which_demonstration_they_are_about(tmp_path):
+    table = write_table(tmp_path / "table.csv")
+    loaded = load([table], InputOptions(label="action"))
+    assert loaded.notes == ("table.csv: 1 of 3 rows have no action and are left out",)
+
+
+def test_a_bag_is_told_by_its_files_even_without_metadata(tmp_path):
+    bag = write_bag(tmp_path / "bag")
+    (bag / "metadata.yaml").unlink()
+    with pytest.raises(InputError, match="ros2 bag reindex"):
+        load([bag])
+
+
+def test_a_recording_is_told_by_its_first_line_not_by_its_name(tmp_path):
+    path = write_recording(tmp_path).rename(tmp_path / "mine.txt")
+    assert names(load([path])) == ["mine.txt"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        InputOptions(state_topics=(StateTopic("/s"),)),
+        InputOptions(action_topics=("/a",)),
+        InputOptions(sample_rate=10.0),
+        InputOptions(skip_bad=True),
+    ],
+)
+def test_an_option_for_bags_needs_a_bag(tmp_path, options):
+    table = write_table(tmp_path / "table.csv")
+    with pytest.raises(OptionError, match="no input is a bag"):
+        load([table], options)
+    load([table, write_bag(tmp_path / "bag")], options)
+
+
+@pytest.mark.parametrize("options", [InputOptions(label="x"), InputOptions(header=False)])
+def test_an_option_for_tables_needs_a_table(tmp_path, options):
+    with pytest.raises(OptionError, match="no input is a CSV table"):
+        load([write_bag(tmp_path / "bag")], options)
+
+
+def test_a_demonstration_counts_once(tmp_path):
+    path = write_recording(tmp_path / "recordings")
+    with pytest.raises(InputError, match="given twice"):
+        load([tmp_path / "recordings", path])
+
+
+def test_what_is_not_there_is_refused(tmp_path):
+    with pytest.raises(InputError, match="there is no input"):
+        load([])
+    with pytest.raises(InputError, match="does not exist"):
+        load([tmp_path / "nothing"])
+    with pytest.raises(InputError, match="record a demonstration first"):
+        load([tmp_path])
+    with pytest.raises(InputError, match="cannot be read"):
+        load([tmp_path / ("long" * 100)])
+
+
+def learned() -> LearnedTree:
+    go = nodes.Action("go", "/a")
+    figures = Figures(0, None, None, 0)
+    origin = Provenance(1, 1, 0.0, None, 0.0, Root.SELECTOR, False, figures)
+    return LearnedTree((Feature("x"),), (go,), nodes.Selector((go,)), origin)
+
+
+def test_a_tree_reads_back_as_it_was_written(tmp_path):
+    write_tree(tmp_path / "new" / "tree.json", learned())
+    assert read_tree(tmp_path / "new" / "tree.json") == learned()
+
+
+def test_a_malformed_tree_file_is_named(tmp_path):
+    path = tmp_path / "tree.json"
+    path.write_text("{")
+    with pytest.raises(DocumentError, match=r"tree\.json: "):
+        read_tree(path)
+    with pytest.raises(InputError, match="does not exist"):
+        read_tree(tmp_path / "nothing.json")
+    with pytest.raises(InputError, match="is a directory"):
+        read_tree(tmp_path)
+
+
+def test_a_reader_sees_the_old_text_or_the_new_one(tmp_path):
+    path = tmp_path / "file"
+    texts = {str(digit) * 200_000 for digit in range(5)}
+    write_text_atomically(path, "0" * 200_000)
+    done = threading.Event()
+
+    def write():
+        for _ in range(5):
+            for text in texts:
+                write_text_atomically(path, text)
+        done.set()
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    seen = set()
+    while not done.is_set():
+        seen.add(path.read_text())
+    writer.join()
+    assert seen <= texts
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_cannot_be_written_leaves_the_old_text_and_nothing_else(tmp_path, monkeypatch):
+    path = tmp_path / "file"
+    write_text_atomically(path, "old")
+
+    def refuse(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(atomic.os, "fsync", refuse)
+    with pytest.raises(StorageError, match="No space left"):
+        write_text_atomically(path, "new")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_places_that_cannot_be_written_are_refused(tmp_path):
+    (tmp_path / "file").touch()
+    for path in (tmp_path, tmp_path / "file" / "below"):
+        with pytest.raises(StorageError, match="cannot be written"):
+            write_text_atomically(path, "text")
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_link_is_followed_and_others_may_read_the_file(tmp_path):
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "target")
+    mask = os.umask(0o022)
+    try:
+        write_text_atomically(link, "über")
+    finally:
+        os.umask(mask)
+    assert link.is_symlink()
+    assert (tmp_path / "target").read_bytes() == "über".encode()
+    assert stat.S_IMODE((tmp_path / "target").stat().st_mode) == 0o644

@@ -1,0 +1,160 @@
+"""What is installed is whole, and says of itself what is true."""
+
+from __future__ import annotations
+
+import ast
+import doctest
+import importlib
+import re
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
+
+import pytest
+
+import rebt_ros.errors
+
+PACKAGE: Final = "rebt_ros"
+CHECKOUT: Final = Path(__file__).resolve().parents[1]
+INSTALLED: Final = Path(rebt_ros.errors.__file__).parent
+SOURCES: Final = sorted(path.relative_to(CHECKOUT) for path in (CHECKOUT / PACKAGE).rglob("*.py"))
+CORE: Final = [path for path in SOURCES if path.parts[1] not in {"commands", "ros"}]
+
+#: Import name to the name in package.xml and in setup.py; ROS packages have one name.
+DECLARED_AS: Final = {
+    "jsonschema": ("python3-jsonschema", "jsonschema"),
+    "networkx": ("python3-networkx", "networkx"),
+    "numpy": ("python3-numpy", "numpy"),
+    "py_trees": ("py_trees", "py_trees"),
+    "pyeda": (None, "pyeda"),  # has no rosdep key
+    "rosbags": ("python3-rosbags-pip", "rosbags"),
+    "sklearn": ("python3-sklearn", "scikit-learn"),
+}
+
+needs_installation = pytest.mark.skipif(
+    INSTALLED == CHECKOUT / PACKAGE, reason="run from the checkout, not by 'make test'"
+)
+
+
+def _manifest() -> ElementTree.Element:
+    return ElementTree.parse(CHECKOUT / "package.xml").getroot()
+
+
+def _setup_arguments() -> dict[str, object]:
+    """The literal arguments of setup.py's call."""
+    tree = ast.parse((CHECKOUT / "setup.py").read_text(encoding="utf-8"))
+    call = next(
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "setup"
+    )
+    return {
+        keyword.arg: keyword.value.value
+        if isinstance(keyword.value, ast.Constant)
+        else ast.unparse(keyword.value)
+        for keyword in call.keywords
+        if keyword.arg
+    }
+
+
+def _imported_packages() -> set[str]:
+    names: set[str] = set()
+    for path in SOURCES:
+        for node in ast.walk(ast.parse((CHECKOUT / path).read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names.update(alias.name.split(".")[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+                names.add(node.module.split(".")[0])
+    return names - sys.stdlib_module_names - {PACKAGE, "__future__"}
+
+
+def _module_name(path: Path) -> str:
+    parts = path.with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def test_every_imported_package_is_declared_in_package_xml() -> None:
+    depends = {element.text for element in _manifest().iter("exec_depend")}
+    keys = {name: DECLARED_AS.get(name, (name, name))[0] for name in _imported_packages()}
+    assert {name: key for name, key in keys.items() if key and key not in depends} == {}
+
+
+def test_setup_py_declares_what_is_imported_from_pypi_and_no_ros() -> None:
+    declared = set(re.findall(r"'([\w-]+)>=", str(_setup_arguments()["install_requires"])))
+    imported = _imported_packages() & DECLARED_AS.keys()
+    assert {DECLARED_AS[name][1] for name in imported} - declared == set()
+    assert declared <= {name for _, name in DECLARED_AS.values()}
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    version = _manifest().findtext("version")
+    assert _setup_arguments()["version"] == version
+    changelog = (CHECKOUT / "CHANGELOG.rst").read_text(encoding="utf-8")
+    newest = re.search(r"^(\d+\.\d+\.\d+|Forthcoming)", changelog, re.MULTILINE)
+    assert newest is not None
+    assert newest[1] in {version, "Forthcoming"}
+
+
+def test_colcon_will_take_it_for_an_ament_python_package() -> None:
+    # colcon falls back to plain Python, silently, when the manifest does not parse.
+    catkin_pkg = pytest.importorskip("catkin_pkg.package")
+    package = catkin_pkg.parse_package(str(CHECKOUT / "package.xml"))
+    assert package.name == PACKAGE
+    assert package.get_build_type() == "ament_python"
+
+
+def test_every_directory_of_modules_is_a_package() -> None:
+    # setup.py leaves a directory without __init__.py out, and nobody notices in the checkout.
+    assert [path for path in SOURCES if not (CHECKOUT / path.parent / "__init__.py").exists()] == []
+
+
+@needs_installation
+def test_the_tests_run_on_the_installed_package_and_it_is_complete() -> None:
+    prefix = CHECKOUT / "install" / PACKAGE
+    assert INSTALLED.is_relative_to(prefix)
+    shipped = sorted(
+        path.relative_to(CHECKOUT)
+        for path in (CHECKOUT / PACKAGE).rglob("*")
+        if path.suffix in {".py", ".json"} or path.name == "py.typed"
+    )
+    assert [path for path in shipped if not (INSTALLED.parent / path).is_file()] == []
+    assert [
+        path.relative_to(INSTALLED.parent)
+        for path in INSTALLED.rglob("*.py")
+        if path.relative_to(INSTALLED.parent) not in SOURCES
+    ] == []
+
+
+@needs_installation
+def test_ros2_run_finds_an_executable_for_every_entry_point() -> None:
+    ament_index_python = pytest.importorskip("ament_index_python")
+    prefix = Path(ament_index_python.get_package_prefix(PACKAGE))
+    names = metadata.distribution(PACKAGE).entry_points.select(group="console_scripts").names
+    assert {"demo", "demonstrator", "executor", "learn", "learner", "recorder", "replay"} <= names
+    found = {path.name for path in (prefix / "lib" / PACKAGE).iterdir() if path.is_file()}
+    assert found == names
+
+
+@needs_installation
+def test_every_entry_point_can_be_loaded() -> None:
+    for entry_point in metadata.distribution(PACKAGE).entry_points.select(group="console_scripts"):
+        assert callable(entry_point.load()), entry_point
+
+
+@needs_installation
+def test_the_parameter_files_are_installed() -> None:
+    ament_index_python = pytest.importorskip("ament_index_python")
+    share = Path(ament_index_python.get_package_share_directory(PACKAGE))
+    shipped = {path.name for path in (CHECKOUT / "config").glob("*.yaml")}
+    assert {path.name for path in (share / "config").glob("*")} == shipped
+    assert {"executor.yaml", "learner.yaml", "recorder.yaml"} <= shipped
+
+
+@pytest.mark.parametrize("path", CORE, ids=_module_name)
+def test_the_examples_in_docstrings_are_true(path: Path) -> None:
+    results = doctest.testmod(importlib.import_module(_module_name(path)))
+    assert results.failed == 0
