@@ -13,27 +13,27 @@ if TYPE_CHECKING:
     from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
     from rebt_ros.errors import RebtError
     from rebt_ros.offline import learn, replay
-    from rebt_ros.pipeline import LastActionUse, LearnOptions
+    from rebt_ros.options import LearnOptions, Use
     from rebt_ros.storage.inputs import InputOptions
 
 __all__ = [
     "InputOptions",
-    "LastActionUse",
     "LearnOptions",
     "LearnedTree",
     "RebtError",
     "Root",
+    "Use",
     "learn",
     "replay",
 ]
 
 _HOMES = {
     "InputOptions": "rebt_ros.storage.inputs",
-    "LastActionUse": "rebt_ros.pipeline",
-    "LearnOptions": "rebt_ros.pipeline",
+    "LearnOptions": "rebt_ros.options",
     "LearnedTree": "rebt_ros.behavior_tree.learned_tree",
     "RebtError": "rebt_ros.errors",
     "Root": "rebt_ros.behavior_tree.learned_tree",
+    "Use": "rebt_ros.options",
     "learn": "rebt_ros.offline",
     "replay": "rebt_ros.offline",
 }

@@ -18,9 +18,11 @@ from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
-from rebt_ros.pipeline import Learning, LearnOptions, Progress
+from rebt_ros.options import LearnOptions
+from rebt_ros.pipeline import Learning, Progress
 from rebt_ros.replay import Replay
 from rebt_ros.replay import replay as replay_demonstrations
+from rebt_ros.selection import JudgedLevels
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.inputs import InputOptions, load
 from rebt_ros.storage.tree_file import read_tree, write_tree
@@ -145,8 +147,19 @@ def summarize(learning: Learning) -> dict[str, Any]:
         "root": provenance.root.value,
         "delta": provenance.delta,
         "max_depth": provenance.max_depth,
+        "psa": learning.policy.psa,
         "ccp_alpha": provenance.ccp_alpha,
+        "reasons": list(learning.policy.reasons),
+        "levels": list(_levels(learning.policy.levels)),
     }
+
+
+def _levels(levels: JudgedLevels | None) -> Iterator[dict[str, float]]:
+    """The pruning levels that were chosen from, with their agreement in cross-validation."""
+    if levels is not None:
+        columns = (levels.ccp_alphas, levels.means, levels.standard_errors)
+        for alpha, mean, error in zip(*(column.tolist() for column in columns), strict=True):
+            yield {"ccp_alpha": alpha, "own_history_agreement": mean, "standard_error": error}
 
 
 def _versions() -> dict[str, str]:

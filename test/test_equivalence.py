@@ -146,7 +146,7 @@ def every(table: DemonstrationTable, step: int) -> DemonstrationTable:
     return with_last(part, table.last[::step])
 
 
-@pytest.mark.parametrize("root", Root)
+@pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])
 @pytest.mark.parametrize("last_action", [False, True], ids=["without LAT", "with LAT"])
 @settings(max_examples=40, deadline=None)
 @given(table=tables())

@@ -1,4 +1,7 @@
-"""Past the paper: a Selector root whose children stand in order of priority.
+"""Past the paper: smaller trees with the same behavior.
+
+Infeasible combinations of conditions are don't-cares, factoring is repeated, and the children of a
+Selector root stand in order of priority.
 
 Under the paper's root each rule must hold in exactly its own states.  Under a Selector a child is
 reached only where all earlier ones failed, so that it may do anything in the states that they
@@ -12,9 +15,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from rebt_ros.algorithms.re_bt_espresso import rule_tree
+from rebt_ros.algorithms.re_bt_espresso import rule_tree, with_root
 from rebt_ros.algorithms.rules import FactoredRule, Rule
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.logic.conditions import deciding
 from rebt_ros.logic.dnf import FALSE, TRUE, Dnf, conditions_of
 from rebt_ros.logic.domain import infeasible
@@ -38,12 +42,20 @@ class Reductions:
     """Rules stand in order of priority, with the states of earlier ones as don't-cares."""
 
 
-def priority_selector(rules: Sequence[Rule], reductions: Reductions = Reductions()) -> nodes.Node:
-    """A Selector over the rules, reduced as far as asked.
+ALL_REDUCTIONS = Reductions()
+
+
+def reduced_tree(
+    rules: Sequence[Rule],
+    reductions: Reductions = ALL_REDUCTIONS,
+    root: Root = Root.SELECTOR,
+) -> nodes.Node:
+    """The rules as a tree, reduced as far as asked.
 
     Args:
         rules: From `leaf_rules`: no two share a state, and together they cover all of them.
-        reductions: What to do.
+        reductions: What to do; priority is for Selectors only.
+        root: Kind of the root node.
     """
     domain = (
         infeasible(conditions_of(_union(rule.dnf for rule in rules)))
@@ -59,7 +71,7 @@ def priority_selector(rules: Sequence[Rule], reductions: Reductions = Reductions
         minimized = minimize(rules[rule].dnf, dont_care=_union((*taken, domain)))
         return _child(rules[rule].actions, float_reduction(minimized), reductions)
 
-    if not reductions.priority:
+    if not reductions.priority or root is not Root.SELECTOR:
         alone = [minimize(rule.dnf, dont_care=domain) for rule in rules]
         trees = [
             _child(rule.actions, float_reduction(dnf), reductions)
@@ -68,7 +80,7 @@ def priority_selector(rules: Sequence[Rule], reductions: Reductions = Reductions
     else:
         order = _best_order(len(rules), lambda rule, earlier: nodes.size(child(rule, earlier)))
         trees = [child(rule, frozenset(order[:place])) for place, rule in enumerate(order)]
-    return trees[0] if len(trees) == 1 else nodes.Selector(tuple(trees))
+    return with_root(root, trees)
 
 
 def _child(actions: tuple[nodes.Action, ...], dnf: Dnf, reductions: Reductions) -> nodes.Node:
@@ -115,3 +127,7 @@ def _meant_by(actions: tuple[str, ...], condition: Factored) -> Factored:
         tuple(deciding(literal, actions) for literal in condition.common),
         tuple(_meant_by(actions, one) for one in condition.alternatives),
     )
+
+
+#: The name for callers that want the default: a Selector root in order of priority.
+priority_selector = reduced_tree

@@ -15,26 +15,28 @@ from rebt_ros.algorithms.rules import FactoredRule, Rule, dt_to_rules, dt_to_rul
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.tree import DecisionTree
+from rebt_ros.errors import OptionError
 from rebt_ros.logic import factoring, float_reduction, inverses, minimize
 from rebt_ros.logic.conditions import Literal
 from rebt_ros.logic.factoring import Factored
 
 
 def re_bt_espresso(
-    dt: DecisionTree, *, delta: float = 0.3, root: Root = Root.PARALLEL
+    dt: DecisionTree, *, delta: float | None = 0.3, root: Root = Root.PARALLEL
 ) -> nodes.Node:
     """Algorithm 1: converts a decision tree into a behavior tree.
 
     Args:
         dt: The decision tree.
-        delta: Threshold of δ-close actions, in [0, 1] (paper: 0.3).
+        delta: Threshold of δ-close actions, in [0, 1] (paper: 0.3); None to trigger the most
+            probable action alone, and so to have no PSA nodes, which the paper offers as SAES.
         root: Kind of the root node (paper: Parallel).
 
     Returns:
         The main tree: a root over one subtree per rule, each of which triggers its action, or its
         PSA node, exactly where the decision tree's leaf does.
     """
-    rules = dt_to_rules_psa(dt, delta)  # line 2
+    rules = dt_to_rules(dt) if delta is None else dt_to_rules_psa(dt, delta)  # line 2
     inv_set = build_inv_set(rules)  # line 3
     rules = logic_minimizer(rules)  # line 4
     rules = reduce_floats(rules)  # line 5
@@ -83,7 +85,11 @@ def action_tree(actions: tuple[nodes.Action, ...]) -> nodes.Node:
 
 
 def with_root(root: Root, children: Sequence[nodes.Node]) -> nodes.Node:
-    """Line 7: the rule trees under the root."""
+    """Line 7: the rule trees under the root.
+
+    Raises:
+        OptionError: A Sequence over several rules, no two of which ever hold in the same state.
+    """
     if len(children) == 1:
         return children[0]
     match root:
@@ -91,6 +97,11 @@ def with_root(root: Root, children: Sequence[nodes.Node]) -> nodes.Node:
             return nodes.Parallel(tuple(children))
         case Root.SELECTOR:
             return nodes.Selector(tuple(children))
+        case Root.SEQUENCE:
+            raise OptionError(
+                f"a Sequence root would fail in every state, as no two of the {len(children)} "
+                "rules hold in the same one: choose selector or parallel."
+            )
 
 
 def condition_trees(condition: Factored, inv_set: frozenset[Literal]) -> list[nodes.Node]:

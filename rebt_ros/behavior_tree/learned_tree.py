@@ -36,6 +36,7 @@ class Root(Enum):
 
     PARALLEL = "parallel"
     SELECTOR = "selector"
+    SEQUENCE = "sequence"
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields, replace
+from enum import Enum
 from pathlib import Path
+from typing import Any, Literal
 
 from rebt_ros import offline
+from rebt_ros.algorithms.priority_root import Reductions
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import add_input_options, input_options, run, use_color
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.errors import OptionError
-from rebt_ros.pipeline import LastActionUse, LearnOptions, summary_sentence
+from rebt_ros.options import LearnOptions, Use
+from rebt_ros.pipeline import summary_sentence
+
+_REDUCTIONS = {
+    "domain": "do not use that thresholds, categories and last actions exclude each other",
+    "repeated_factoring": "pull common conditions out once, as the paper does",
+    "priority": "keep each rule to its own states, instead of ordering them by priority",
+}
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -34,42 +45,55 @@ def _parser() -> argparse.ArgumentParser:
     defaults = LearnOptions()
     learning = parser.add_argument_group("learning (paper, section III)")
     learning.add_argument(
+        "--paper",
+        action="store_true",
+        help="the paper's settings: Algorithm 1 as printed, depth 5, no pruning, last actions and "
+        "PSA nodes always, a Parallel root; other options change them",
+    )
+    learning.add_argument(
         "--delta",
         type=float,
-        default=defaults.delta,
-        help="actions with at least (1 - DELTA) of a leaf's largest share are offered together "
-        "as a Parallel/Selector node; 0 to 1, the paper has 0.3 (default: %(default)s)",
+        help="actions with at least (1 - DELTA) of a leaf's largest share may stand together in "
+        f"a Parallel/Selector node (PSA); 0 to 1 (default: {defaults.delta})",
     )
     learning.add_argument(
         "--max-depth",
         type=_depth,
-        default=defaults.max_depth,
-        metavar="N|none",
-        help="depth of the decision tree (default: %(default)s)",
+        metavar="N|auto",
+        help="depth of the decision tree; auto: grow it fully and prune it (default: auto)",
     )
     learning.add_argument(
         "--ccp-alpha",
-        type=float,
-        default=defaults.ccp_alpha,
-        help="complexity parameter of pruning; larger means smaller trees (default: %(default)s)",
+        type=_ccp_alpha,
+        metavar="ALPHA|auto",
+        help="complexity parameter of pruning, larger means smaller trees; auto: the smallest "
+        "tree within one standard error of the best in cross-validation (default: auto)",
     )
     learning.add_argument(
-        "--root",
-        type=Root,
-        choices=list(Root),
-        default=defaults.root,
-        metavar="|".join(root.value for root in Root),
-        help=f"kind of the root node (default: {defaults.root.value})",
+        "--root", type=Root, choices=list(Root), metavar=_values(Root), help="(default: selector)"
     )
     learning.add_argument(
         "--last-action",
-        type=LastActionUse,
-        choices=list(LastActionUse),
-        default=defaults.last_action,
-        metavar="|".join(use.value for use in LastActionUse),
+        type=Use,
+        choices=list(Use),
+        metavar=_values(Use),
         help="whether the tree may test the last action taken; auto: only where that raises "
-        "own-history agreement on the held-out rows (default: auto)",
+        "own-history agreement in cross-validation (default: auto)",
     )
+    learning.add_argument(
+        "--psa",
+        type=Use,
+        choices=list(Use),
+        metavar=_values(Use),
+        help="whether PSA nodes stand in the tree; auto as above (default: auto)",
+    )
+    for reduction in fields(Reductions):
+        learning.add_argument(
+            f"--no-{reduction.name.replace('_', '-')}",
+            dest=reduction.name,
+            action="store_false",
+            help=_REDUCTIONS[reduction.name],
+        )
     learning.add_argument(
         "--test-fraction",
         type=float,
@@ -95,27 +119,42 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _depth(text: str) -> int | None:
-    return None if text == "none" else int(text)
+def _values(kind: type[Enum]) -> str:
+    return "|".join(str(member.value) for member in kind)
 
 
-def _learn(parsed: argparse.Namespace) -> None:
-    options = LearnOptions(
-        delta=parsed.delta,
-        max_depth=parsed.max_depth,
-        ccp_alpha=parsed.ccp_alpha,
-        root=parsed.root,
-        last_action=parsed.last_action,
+def _depth(text: str) -> int | Literal["auto"]:
+    return "auto" if text in ("auto", "none") else int(text)
+
+
+def _ccp_alpha(text: str) -> float | Literal["auto"]:
+    return "auto" if text == "auto" else float(text)
+
+
+def _options(parsed: argparse.Namespace) -> LearnOptions:
+    """The defaults, or the paper's settings, with what was asked for."""
+    asked: dict[str, Any] = {
+        name: None if (value := getattr(parsed, name)) == "auto" else value
+        for name in ("delta", "max_depth", "ccp_alpha", "root", "last_action", "psa")
+        if getattr(parsed, name) is not None
+    }
+    reductions = Reductions(**{one.name: getattr(parsed, one.name) for one in fields(Reductions)})
+    return replace(
+        LearnOptions.paper() if parsed.paper else LearnOptions(reductions=reductions),
+        **asked,
         test_fraction=parsed.test_fraction,
         refit=parsed.refit,
         random_state=parsed.random_state,
     )
+
+
+def _learn(parsed: argparse.Namespace) -> None:
     progress = ProgressBar()
     try:
         result = offline.learn(
             parsed.inputs,
             out=parsed.out,
-            options=options,
+            options=_options(parsed),
             reading=input_options(parsed),
             declared=_declared(parsed),
             progress=progress,
@@ -128,6 +167,8 @@ def _learn(parsed: argparse.Namespace) -> None:
     print(render_text(result.learned, color=use_color()))
     print(summary_sentence(result.learned))
     print(_judgement(result))
+    for reason in result.learning.policy.reasons:
+        print(f"  - {reason}")
     print(f"Written to {parsed.out}: tree.json, summary.json, tree.svg, tree.dot, tree.txt.")
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from sklearn.tree import DecisionTreeClassifier
 
-from rebt_ros.arrays import BoolArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree.nodes import Action
 from rebt_ros.decision_tree.encoding import Indicator, Number, columns, encode
 from rebt_ros.decision_tree.pruning import PruningPath, pruning_path
@@ -57,6 +57,33 @@ class FittedTree:
             self.classifier,
             self.path.standing(is_leaf),
         )
+
+    def agreements(self, table: DemonstrationTable, ccp_alphas: FloatArray) -> FloatArray:
+        """Share of a table's rows that each pruning level predicts, shape (levels,).
+
+        A node decides at the levels from its own ``collapse`` up to its parent's.  So the rows that
+        a level predicts are those that reach its deciding nodes with their majority action, and
+        one pass over the nodes counts them for all levels.
+
+        Args:
+            table: At least one row, with the actions that the tree was fitted to.
+            ccp_alphas: The levels, ascending, shape (levels,).
+        """
+        tree = self.classifier.tree_
+        reached = self.classifier.decision_path(encode(table, self.uses_last_action)).tocsc()
+        majority = self.classifier.classes_[np.argmax(tree.value[:, 0, :], axis=1)]
+        node_of_entry = np.repeat(np.arange(tree.node_count), np.diff(reached.indptr))
+        right = table.chosen[reached.indices] == majority[node_of_entry]
+        predicted = np.bincount(node_of_entry[right], minlength=tree.node_count)
+        # 0 does not prune, also not what could be pruned at no cost.
+        levels = np.where(ccp_alphas > 0, ccp_alphas, -np.inf)
+        first = np.searchsorted(levels, self.path.collapse, side="left")
+        parents = self.path.parents
+        end = np.where(parents < 0, len(levels), first[parents])
+        change = np.zeros(len(levels) + 1)
+        np.add.at(change, first, predicted)
+        np.add.at(change, end, -predicted)
+        return np.asarray(np.cumsum(change)[:-1] / len(table))
 
 
 def fit(

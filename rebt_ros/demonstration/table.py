@@ -14,6 +14,9 @@ from rebt_ros.demonstration.last_action import last_actions
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError, OptionError
 
+#: Categories of truth values that are sometimes missing, in the order of 0 and 1.
+_TRUTH = ("False", "True")
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DemonstrationTable:
@@ -100,9 +103,7 @@ def tabulate(
     features, states = _joined_states(demonstrations)
     features, states = _with_kinds(features, states, declared or {})
     channels = sorted({channel for one in demonstrations for channel in one.channels})
-    return tuple(
-        _channel_table(channel, demonstrations, features, states) for channel in channels
-    )
+    return tuple(_channel_table(channel, demonstrations, features, states) for channel in channels)
 
 
 def _channel_table(
@@ -163,17 +164,21 @@ def _unified(first: Feature, *others: Feature) -> Feature:
     kinds = {one.kind for one in (first, *others)}
     if FeatureKind.CATEGORICAL not in kinds:
         return first if kinds == {first.kind} else replace(first, kind=FeatureKind.NUMERIC)
+    categories = {name for one in (first, *others) for name in one.categories}
+    if kinds == {FeatureKind.BINARY, FeatureKind.CATEGORICAL} and categories <= {*_TRUTH}:
+        # The same truth values, with gaps in one of the demonstrations.
+        return replace(first, kind=FeatureKind.CATEGORICAL, categories=_TRUTH)
     if kinds != {FeatureKind.CATEGORICAL}:
         raise InputError(
             f"feature {first.name!r} holds text in one demonstration and numbers in another: "
             "give it one kind of values."
         )
-    categories = sorted({name for one in (first, *others) for name in one.categories})
-    return replace(first, categories=tuple(categories))
+    return replace(first, categories=tuple(sorted(categories)))
 
 
 def _recoded(column: FloatArray, mine: Feature, unified: Feature) -> FloatArray:
-    if mine.categories == unified.categories:
+    if mine.categories == unified.categories or mine.kind is FeatureKind.BINARY:
+        # 0 and 1 are the positions of false and true as well.
         return column
     position = np.array([unified.categories.index(name) for name in mine.categories], dtype=float)
     known = ~np.isnan(column)
@@ -219,11 +224,11 @@ def _detected(feature: Feature, values: FloatArray) -> FeatureKind:
 def _check_kind(feature: Feature, kind: FeatureKind, values: FloatArray) -> None:
     text_as_numbers = feature.kind is FeatureKind.CATEGORICAL and kind is not feature.kind
     not_binary = kind is FeatureKind.BINARY and not np.isin(values, (0.0, 1.0)).all()
-    if text_as_numbers or not_binary or (kind is FeatureKind.CATEGORICAL and not len(values)):
-        raise OptionError(
-            f"feature {feature.name!r} cannot be {kind.value}: it holds "
-            + ("text." if text_as_numbers else f"{', '.join(map(category, values[:3]))}…")
-        )
+    uncounted = kind is FeatureKind.CATEGORICAL and kind is not feature.kind and not len(values)
+    if text_as_numbers or not_binary or uncounted:
+        numbers = [category(value) for value in values[:3]] + ["…"] * (len(values) > 3)
+        held = "text" if text_as_numbers else ", ".join(numbers) or "nothing"
+        raise OptionError(f"feature {feature.name!r} cannot be {kind.value}: it holds {held}.")
 
 
 def category(value: float) -> str:

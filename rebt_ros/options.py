@@ -1,0 +1,81 @@
+"""How to learn: everything that the paper's section III leaves to the user, and more."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from rebt_ros.algorithms.priority_root import ALL_REDUCTIONS, Reductions
+from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.errors import OptionError
+
+
+class Use(Enum):
+    """Whether the executed tree has something."""
+
+    AUTO = "auto"
+    """Only if that raises own-history agreement on rows that it was not learned from."""
+    ALWAYS = "always"
+    NEVER = "never"
+
+
+@dataclass(frozen=True, slots=True)
+class LearnOptions:
+    """What section III of the paper leaves to the user, and how to judge the result.
+
+    Raises:
+        OptionError: A value out of its range.
+    """
+
+    delta: float = 0.3
+    """Threshold δ in [0, 1] of actions that are close enough to stand in one PSA node."""
+    psa: Use = Use.AUTO
+    """Whether PSA nodes stand in the executed tree."""
+    last_action: Use = Use.AUTO
+    """Whether the executed tree may test LAT."""
+    max_depth: int | None = None
+    """Splits on the decision tree's longest path; None to grow it fully, which leaves its size to
+    pruning (paper: 5)."""
+    ccp_alpha: float | None = None
+    """Complexity parameter of minimal cost-complexity pruning, 0 prunes nothing; None to choose
+    it by cross-validation."""
+    root: Root = Root.SELECTOR
+    reductions: Reductions | None = ALL_REDUCTIONS
+    """Reductions past the paper; None for Algorithm 1 as printed."""
+    test_fraction: float = 0.25
+    """Share of the rows, or of the demonstrations if several, that is held out; in [0, 1)."""
+    refit: bool = False
+    """Whether the tree is learned from all rows in the end, once it has been judged."""
+    random_state: int = 0
+    """Decides between equally good splits."""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.delta <= 1:
+            raise OptionError(f"delta must lie between 0 and 1, not at {self.delta:g}.")
+        if self.max_depth is not None and self.max_depth < 1:
+            raise OptionError(f"max_depth must be at least 1, not {self.max_depth}.")
+        if self.ccp_alpha is not None and not 0 <= self.ccp_alpha < math.inf:
+            raise OptionError(f"ccp_alpha must be 0 or more, not {self.ccp_alpha:g}.")
+        if not 0 <= self.test_fraction < 1:
+            raise OptionError(
+                f"test_fraction must be at least 0 and less than 1, not {self.test_fraction:g}."
+            )
+        if not 0 <= self.random_state < 2**32:
+            raise OptionError(f"random_state must be a 32-bit number, not {self.random_state}.")
+
+    @classmethod
+    def paper(cls) -> LearnOptions:
+        """The paper's settings (IV-B)."""
+        return cls(
+            delta=0.3,
+            psa=Use.ALWAYS,
+            last_action=Use.ALWAYS,
+            max_depth=5,
+            ccp_alpha=0.0,
+            root=Root.PARALLEL,
+            reductions=None,
+        )
+
+
+DEFAULTS = LearnOptions()

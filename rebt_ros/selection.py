@@ -1,0 +1,153 @@
+"""Choosing a pruning level by cross-validation and the one-standard-error rule.
+
+A level is judged by its agreement with rows that it was not learned from.  Of all levels within
+one standard error of the best one, the smallest tree is chosen (Breiman et al., 1984): where the
+folds cannot tell trees apart, the one that is easiest to read is the best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rebt_ros import evaluation
+from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.demonstration.table import DemonstrationTable
+
+_FOLDS = 5
+#: A LAT-augmented tree has to be run through the rows to be judged: so many levels are.
+_MOST_LEVELS_RUN = 12
+
+#: Makes a behavior tree of a pruned decision tree.
+Convert = Callable[[TrainedTree], nodes.Node]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class JudgedLevels:
+    """Pruning levels with their agreement in each fold."""
+
+    ccp_alphas: FloatArray
+    """Ascending, shape (levels,): larger means a smaller tree."""
+    scores: FloatArray
+    """Agreement with the rows of each fold, shape (folds, levels)."""
+
+    @property
+    def means(self) -> FloatArray:
+        """Mean agreement of each level, shape (levels,)."""
+        return np.asarray(np.mean(self.scores, axis=0))
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard error of each mean, shape (levels,)."""
+        folds = len(self.scores)
+        if folds < 2:
+            return np.zeros(self.scores.shape[1])
+        return np.asarray(np.std(self.scores, axis=0, ddof=1) / np.sqrt(folds))
+
+    @property
+    def best(self) -> int:
+        """The level with the highest mean."""
+        return int(np.argmax(self.means))
+
+    @property
+    def chosen(self) -> int:
+        """The smallest tree within one standard error of the best.
+
+        The last level, which takes one action whatever happens, is not chosen unless it is best.
+        """
+        enough = self.means[self.best] - self.standard_errors[self.best]
+        smallest = int(np.flatnonzero(self.means >= enough)[-1])
+        return smallest if smallest < len(self.means) - 1 else max(self.best, smallest - 1)
+
+
+class CrossValidation:
+    """One fit to all rows and one to the rows outside each fold, all with their pruning levels.
+
+    A level's ``ccp_alpha`` stands for the range up to the next one, at whose geometric middle the
+    folds' trees are pruned.
+
+    Args:
+        table: At least two rows.
+        last_action: Whether the trees may test LAT.
+        max_depth: Splits on the longest path; None for no limit.
+        random_state: Decides between equally good splits.
+    """
+
+    def __init__(
+        self,
+        table: DemonstrationTable,
+        *,
+        last_action: bool,
+        max_depth: int | None,
+        random_state: int,
+    ) -> None:
+        def fitted(rows: DemonstrationTable) -> FittedTree:
+            return fit(
+                rows, last_action=last_action, max_depth=max_depth, random_state=random_state
+            )
+
+        fold = folds(table)
+        self.fitted = fitted(table)
+        self._folds = [
+            (fitted(table.where(fold != number)), table.where(fold == number))
+            for number in np.unique(fold)
+        ]
+        self._middles = _middles(self.fitted.path.alphas)
+
+    def teacher_forced(self) -> JudgedLevels:
+        """All levels with their teacher-forced agreement."""
+        scores = [of_fold.agreements(rows, self._middles) for of_fold, rows in self._folds]
+        return JudgedLevels(self.fitted.path.alphas, np.array(scores))
+
+    def own_history(self, convert: Convert) -> JudgedLevels:
+        """Levels with their own-history agreement: all, or an even selection if LAT is tested."""
+        if not self.fitted.uses_last_action:
+            # Without LAT a tree's own history makes no difference.
+            return self.teacher_forced()
+        levels = len(self.fitted.path)
+        run = np.unique(np.linspace(0, levels - 1, min(levels, _MOST_LEVELS_RUN)).astype(int))
+        scores = [
+            [
+                _agreement_run(convert(of_fold.at(alpha)), rows)
+                for alpha in self._middles[run].tolist()
+            ]
+            for of_fold, rows in self._folds
+        ]
+        return JudgedLevels(self.fitted.path.alphas[run], np.array(scores))
+
+    def own_history_at(self, ccp_alpha: float, convert: Convert) -> float:
+        """Mean own-history agreement of the folds' trees at one level."""
+        return float(
+            np.mean(
+                [
+                    _agreement_run(convert(of_fold.at(ccp_alpha)), rows)
+                    for of_fold, rows in self._folds
+                ]
+            )
+        )
+
+
+def folds(table: DemonstrationTable) -> IntArray:
+    """The fold of each row: whole demonstrations, or stretches of the only one, shape (rows,).
+
+    Neighbouring rows resemble each other, so that a row whose neighbours were learned from would
+    tell little.
+    """
+    shown, position = np.unique(table.demonstration, return_inverse=True)
+    if len(shown) == 1:
+        return np.arange(len(table)) * _FOLDS // max(len(table), 1)
+    return position * min(_FOLDS, len(shown)) // len(shown)
+
+
+def _agreement_run(tree: nodes.Node, rows: DemonstrationTable) -> float:
+    return float(np.mean(evaluation.own_history_choices(tree, rows) == rows.chosen))
+
+
+def _middles(alphas: FloatArray) -> FloatArray:
+    """Geometric middle between each ``ccp_alpha`` and the next one; the last stays."""
+    following = np.append(alphas[1:], alphas[-1])
+    return np.asarray(np.sqrt(alphas * following))
