@@ -1,0 +1,254 @@
+"""``make bench-reduction``: how much smaller than BT-Espresso's our trees are (paper, Fig. 5).
+
+Simulates every configuration, learns a decision tree at each pruning level, and converts it with
+BT-Espresso, with the paper's two reductions (no SAES), and with all of ours.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+import joblib
+import numpy as np
+
+from rebt_ros.algorithms.priority_root import priority_selector
+from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
+from rebt_ros.algorithms.rules import leaf_rules
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.commands.progress import ProgressBar
+from rebt_ros.commands.shell import run
+from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.tree import DecisionTree, Leaf
+from rebt_ros.demonstration.table import tabulate
+from rebt_ros.errors import InputError, OptionError
+from rebt_ros.evaluation import teacher_forced_choices
+from rebt_ros.simulation.experiment_config import ExperimentConfig, parse_config
+from rebt_ros.simulation.experiment_robot import TICKS, ExperimentRobot, simulate
+from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.text import read_text
+
+#: The paper's depth of decision trees (IV-B).
+_MAX_DEPTH = 5
+
+_MODES: dict[str, Callable[[DecisionTree], nodes.Node]] = {
+    "paper": lambda tree: re_bt_espresso(tree, delta=0.0),
+    "default": lambda tree: priority_selector(
+        leaf_rules(tree, lambda leaf: (leaf.most_probable,))
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """Number of nodes of a tree."""
+
+    emitted: int
+    without_inverters: int
+
+    @classmethod
+    def of(cls, tree: nodes.Node) -> Size:
+        """The size of a tree."""
+        inverters = sum(isinstance(node, nodes.Inverter) for node in nodes.walk(tree))
+        emitted = nodes.size(tree)
+        return cls(emitted, emitted - inverters)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One decision tree, converted by BT-Espresso and by one mode."""
+
+    baseline: Size
+    size: Size
+    mismatches: int
+    """Rows on which the mode's tree and the decision tree differ."""
+
+    @property
+    def reduction(self) -> float:
+        """Per cent of the baseline's nodes that are gone, Inverters left out on both sides."""
+        before = self.baseline.without_inverters
+        return 100 * (before - self.size.without_inverters) / before
+
+    @property
+    def reduction_as_emitted(self) -> float:
+        """The same, with Inverters."""
+        return 100 * (self.baseline.emitted - self.size.emitted) / self.baseline.emitted
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigurationResult:
+    """The pruning levels of one configuration."""
+
+    rows: int
+    comparisons: dict[str, list[Comparison]]
+    """By mode."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point."""
+    parsed = _parser().parse_args(arguments)
+    run(lambda: _bench(parsed), "bench-reduction")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="bench-reduction",
+        description="Compares the sizes of BT-Espresso's trees and ours on simulated experiments.",
+    )
+    parser.add_argument(
+        "experiments", type=Path, metavar="DIR", help="directory of configuration files (*.json)"
+    )
+    parser.add_argument(
+        "--ticks", type=int, default=TICKS, help="per configuration (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="default: %(default)s")
+    parser.add_argument(
+        "--jobs", type=int, default=-1, help="processes (default: one per processor)"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("bench-results/reduction.json"),
+        metavar="FILE",
+        help="default: %(default)s",
+    )
+    return parser
+
+
+def _bench(parsed: argparse.Namespace) -> None:
+    if parsed.jobs == 0:
+        raise OptionError("jobs is 0: name a number of processes, or -1 for one per processor.")
+    configs = read_configs(parsed.experiments)
+    start = time.monotonic()
+    results: list[ConfigurationResult] = []
+    progress = ProgressBar()
+    try:
+        tasks = (joblib.delayed(compare)(config, parsed.ticks, parsed.seed) for config in configs)
+        for result in joblib.Parallel(n_jobs=parsed.jobs, return_as="generator")(tasks):
+            results.append(result)
+            progress(f"{len(results)} of {len(configs)}", len(results) / len(configs))
+    finally:
+        progress.clear()
+    seconds = time.monotonic() - start
+    figures = {
+        mode: summarize([one for result in results for one in result.comparisons[mode]])
+        for mode in _MODES
+    }
+    rows = sum(result.rows for result in results)
+    settings = {"ticks": parsed.ticks, "seed": parsed.seed, "max_depth": _MAX_DEPTH}
+    work = {"configurations": len(configs), "rows": rows, "seconds": round(seconds, 1)}
+    write_text_atomically(parsed.out, json.dumps(figures | settings | work, indent=1) + "\n")
+    skipped = [note for config in configs for note in config.notes]
+    if skipped:
+        print(f"note: {len(skipped)} nodes without meaning were skipped, such as: {skipped[0]}.")
+    print(_table(figures))
+    print(
+        f"{len(configs)} configurations, {parsed.ticks} ticks each, {rows} rows, "
+        f"{seconds:.0f} s. Written to {parsed.out}."
+    )
+
+
+def read_configs(directory: Path) -> list[ExperimentConfig]:
+    """The configurations of a directory, in the order of the numbers in their names.
+
+    Raises:
+        InputError: There are none, or one is malformed.
+    """
+    paths = sorted(
+        directory.glob("*.json"),
+        key=lambda path: [int(part) if part.isdigit() else part for part in _parts(path.stem)],
+    )
+    if not paths:
+        raise InputError(f"{directory} has no configuration files: name a directory of *.json.")
+    return [parse_config(read_text(path), path.stem) for path in paths]
+
+
+def _parts(name: str) -> list[str]:
+    """Texts and numbers by turns, beginning with a text.
+
+    >>> _parts("expr10")
+    ['expr', '10', '']
+    """
+    return re.split(r"([0-9]+)", name)
+
+
+def compare(config: ExperimentConfig, ticks: int, seed: int) -> ConfigurationResult:
+    """Simulates one configuration and compares the trees of all its pruning levels.
+
+    Levels with a single leaf are left out.
+    """
+    comparisons: dict[str, list[Comparison]] = {mode: [] for mode in _MODES}
+    demonstration = simulate(ExperimentRobot(config, seed), ticks).demonstration
+    if not len(demonstration):
+        return ConfigurationResult(0, comparisons)
+    (table,) = tabulate([demonstration])
+    fitted = fit(table, last_action=True, max_depth=_MAX_DEPTH)
+    for alpha in fitted.path.alphas:
+        trained = fitted.at(float(alpha))
+        if isinstance(trained.tree.root, Leaf):
+            continue
+        predicted = trained.predict(table)
+        baseline = Size.of(bt_espresso(trained.tree))
+        for mode, convert in _MODES.items():
+            tree = convert(trained.tree)
+            mismatches = int(np.sum(teacher_forced_choices(tree, table) != predicted))
+            comparisons[mode].append(Comparison(baseline, Size.of(tree), mismatches))
+    return ConfigurationResult(len(table), comparisons)
+
+
+def summarize(comparisons: Sequence[Comparison]) -> dict[str, float | dict[str, float]]:
+    """The figures of one mode, reductions in per cent.
+
+    Raises:
+        InputError: There is nothing to compare.
+    """
+    if not comparisons:
+        raise InputError("no decision tree had more than one leaf: simulate more ticks.")
+    return {
+        **_distribution([one.reduction for one in comparisons]),
+        "mismatches": sum(one.mismatches for one in comparisons),
+        "trees": len(comparisons),
+        "as_emitted": _distribution([one.reduction_as_emitted for one in comparisons]),
+    }
+
+
+def _distribution(reductions: Sequence[float]) -> dict[str, float]:
+    reduced = sum(reduction > 0 for reduction in reductions)
+    return {
+        "median": round(median(reductions), 2),
+        "maximum": round(max(reductions), 2),
+        "share_reduced": round(100 * reduced / len(reductions), 2),
+    }
+
+
+def _table(figures: dict[str, dict[str, float | dict[str, float]]]) -> str:
+    """The figures for a person to read."""
+    lines = [("fewer nodes than BT-Espresso", "median", "maximum", "trees reduced", "mismatches")]
+    for mode, figure in figures.items():
+        emitted = figure["as_emitted"]
+        assert isinstance(emitted, dict)
+        lines.append((f"{mode} mode", *_percentages(figure), str(figure["mismatches"])))
+        lines.append((f"{mode} mode, Inverters counted", *_percentages(emitted), ""))
+    lines.append(("trees compared", "", "", str(next(iter(figures.values()))["trees"]), ""))
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if place == 0 else cell.rjust(width)
+            for place, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in lines
+    )
+
+
+def _percentages(figure: dict[str, float] | dict[str, float | dict[str, float]]) -> list[str]:
+    return [f"{figure[name]:.2f} %" for name in ("median", "maximum", "share_reduced")]
+
+
+if __name__ == "__main__":
+    main()
