@@ -29,6 +29,8 @@ LAYERS: Final = (
     {PACKAGE},  # rebt_ros/__init__.py, the public interface
     {"offline"},
     {"pipeline", "replay"},
+    {"choosing"},
+    {"selection", "options"},
     {"evaluation", "simulation", "storage"},
     {"algorithms"},
     {"decision_tree"},
@@ -61,7 +63,13 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 #: Libraries with a home: the only modules that import them.
 HOMES: Final = {
     "jsonschema": ("rebt_ros.behavior_tree.document",),
-    "py_trees": ("rebt_ros.behavior_tree.runtime", "rebt_ros.ros", "rebt_ros.ros.*"),
+    "joblib": ("rebt_ros.commands.bench_*",),
+    "py_trees": (
+        "rebt_ros.behavior_tree.runtime",
+        "rebt_ros.ros",
+        "rebt_ros.ros.*",
+        "rebt_ros.simulation.py_trees_form",
+    ),
     "pyeda": ("rebt_ros.logic.minimize",),
     "rosbags": ("rebt_ros.storage", "rebt_ros.storage.*"),
     "scipy": (),
@@ -70,7 +78,7 @@ HOMES: Final = {
 
 #: Run code that comes from data, or read formats that do.
 DANGEROUS_NAMES: Final = frozenset({"eval", "exec", "__import__"})
-DANGEROUS_MODULES: Final = frozenset({"dill", "joblib", "marshal", "pickle", "shelve"})
+DANGEROUS_MODULES: Final = frozenset({"dill", "marshal", "pickle", "shelve"})
 
 
 @dataclass(frozen=True)

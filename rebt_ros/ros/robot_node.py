@@ -97,7 +97,8 @@ class RobotNode(Node):
             QoSProfile(depth=_REMEMBERED, durability=DurabilityPolicy.TRANSIENT_LOCAL),
         )
         for topic in dict.fromkeys(command_topics):
-            self.create_subscription(String, topic, self._on_command, 10)
+            # A queue would only make commands late.
+            self.create_subscription(String, topic, self._on_command, 1)
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.add_post_set_parameters_callback(self._on_parameters)
         self.create_timer(1.0 / (rate * speedup), self._on_tick)

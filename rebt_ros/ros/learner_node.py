@@ -1,0 +1,236 @@
+"""The learner: learns a behavior tree from the recordings when it is asked to, and publishes it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any, Final
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.document import dumps, loads
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
+from rebt_ros.errors import RebtError
+from rebt_ros.ros import lifetime
+from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
+from rebt_ros.ros.learning_process import LearningProcess, Request
+from rebt_ros.ros.parameters import Parameters
+from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.tree_file import read_tree
+
+#: Who subscribes later gets the latest tree, too.
+TREE_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+_TREE_FILE: Final = "tree.json"
+
+#: One thread learns, while others answer a second call, parameters, and diagnostics.
+_THREADS: Final = 4
+
+_USES: Final = ("auto", "always", "never")
+
+#: How long the end of the node waits for a call that is under way (seconds).
+_LAST_ANSWER: Final = 1.0
+
+
+class LearnerNode(Node):
+    """Offers ``~/relearn``; learning itself takes place in a `LearningProcess`.
+
+    A tree that was learned is written to disk first and published then; when learning fails, the
+    tree before it stays in both places.
+
+    Raises:
+        OptionError: A parameter makes no sense.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("learner")
+        self._busy = threading.Lock()
+        self._since = 0.0
+        self._last = Report(Level.OK, "idle: nothing was learned yet")
+        self._learned: LearnedTree | None = None
+        self._declare()
+        self._publisher = self.create_publisher(String, "behavior_tree", TREE_QOS)
+        self._publish_what_is_on_disk()
+        self._process = LearningProcess()
+        self._process.start()
+        self.create_service(
+            Trigger, "~/relearn", self._relearn, callback_group=ReentrantCallbackGroup()
+        )
+        self._diagnostics = Diagnostics(
+            self, "learning", self._report, MutuallyExclusiveCallbackGroup()
+        )
+
+    def close(self) -> None:
+        """Ends the learning process, also while it learns."""
+        self._process.close()
+        if self._busy.acquire(timeout=_LAST_ANSWER):
+            self._busy.release()
+
+    def _declare(self) -> None:
+        declare = Parameters(self)
+        self._demonstrations = declare.directory(
+            "demonstrations",
+            "demonstrations",
+            "Directory of the recordings to learn from; ~ is your home.",
+            fixed=False,
+        )
+        self._output = declare.directory(
+            "output", "learned", "Directory that tree.json is written to.", fixed=False
+        )
+        self._max_depth = declare.integer(
+            "max_depth", 0, "Splits on the longest path; 0 for no limit.", 0, 100, fixed=False
+        )
+        self._ccp_alpha = declare.number(
+            "ccp_alpha",
+            -1.0,
+            "Complexity parameter of the pruning, 0.0 prunes nothing; -1.0 to choose it by "
+            "cross-validation.",
+            -1.0,
+            1e9,
+            fixed=False,
+        )
+        self._binary = declare.texts(
+            "binary_features",
+            [],
+            "Features to take for binary; others are if they hold nothing but 0 and 1.",
+            fixed=False,
+        )
+        self._categorical = declare.texts(
+            "categorical_features", [], "Features whose numbers are categories.", fixed=False
+        )
+        self._options = {
+            "delta": declare.number(
+                "delta",
+                0.3,
+                "Threshold δ of actions that are close enough to stand in one PSA node.",
+                0.0,
+                1.0,
+                fixed=False,
+            ),
+            "psa": declare.text(
+                "psa",
+                "auto",
+                "Whether PSA nodes stand in the tree; auto: where they do no harm.",
+                choices=_USES,
+                fixed=False,
+            ),
+            "root": declare.text(
+                "root",
+                "selector",
+                "Root node: selector, smaller, or parallel, as in the paper.",
+                choices=[root.value for root in Root],
+                fixed=False,
+            ),
+            "last_action": declare.text(
+                "last_action",
+                "auto",
+                "Whether the tree may test the last action taken; auto: where it does no harm.",
+                choices=_USES,
+                fixed=False,
+            ),
+            "test_fraction": declare.number(
+                "test_fraction", 0.25, "Share to hold out for judging.", 0.0, 0.9, fixed=False
+            ),
+            "refit": declare.flag(
+                "refit", True, "Whether to learn from all rows once it is judged.", fixed=False
+            ),
+            "random_state": declare.integer(
+                "random_state",
+                0,
+                "Decides between equally good splits.",
+                0,
+                2**32 - 1,
+                fixed=False,
+            ),
+        }
+
+    def _relearn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if not self._busy.acquire(blocking=False):
+            response.message = (
+                f"busy: learning since {time.monotonic() - self._since:.0f} s, "
+                "call again when that is done."
+            )
+            return response
+        try:
+            self._since = time.monotonic()
+            response.message = self._learn()
+            response.success = True
+            self._last = Report(Level.OK, response.message)
+            self.get_logger().info(response.message)
+        except RebtError as err:
+            response.message = str(err)
+            self._last = Report(Level.WARN, response.message)
+            self.get_logger().error(response.message)
+        finally:
+            self._busy.release()
+        return response
+
+    def _learn(self) -> str:
+        """Learns, writes and publishes; returns what a person wants to know."""
+        request = Request(
+            str(self._demonstrations()),
+            {
+                "max_depth": self._max_depth() or None,
+                "ccp_alpha": None if self._ccp_alpha() < 0 else self._ccp_alpha(),
+                **{name: read() for name, read in self._options.items()},
+            },
+            self._binary(),
+            self._categorical(),
+        )
+        path = self._output() / _TREE_FILE
+        lesson = self._process.ask(request)
+        for note in lesson.notes:
+            self.get_logger().warning(note)
+        learned = loads(lesson.document)
+        write_text_atomically(path, lesson.document)
+        self._publish(learned, lesson.document)
+        return f"{lesson.sentence} It is published and in {path}."
+
+    def _publish_what_is_on_disk(self) -> None:
+        path = self._output() / _TREE_FILE
+        if not path.exists():
+            self.get_logger().info(f"there is no tree in {path} yet: call ~/relearn to learn one.")
+            return
+        try:
+            learned = read_tree(path)
+        except RebtError as err:
+            self._last = Report(Level.WARN, str(err))
+            self.get_logger().warning(f"the tree on disk is not published: {err}")
+            return
+        self._publish(learned, dumps(learned))
+        self._last = Report(Level.OK, f"idle: published the tree in {path}")
+        self.get_logger().info(f"published the tree in {path}.")
+
+    def _publish(self, learned: LearnedTree, document: str) -> None:
+        self._learned = learned
+        self._publisher.publish(String(data=document))
+
+    def _report(self) -> Report:
+        values: dict[str, Any] = {"learning process": self._process.id}
+        if self._learned is not None:
+            provenance = self._learned.provenance
+            values |= {
+                "nodes": nodes.size(self._learned.tree),
+                "actions": len(self._learned.actions),
+                "rows": provenance.rows,
+                "demonstrations": provenance.demonstrations,
+                "own-history agreement": provenance.figures.own_history_agreement,
+            }
+        if self._busy.locked():
+            seconds = time.monotonic() - self._since
+            return Report(Level.OK, f"learning since {seconds:.0f} s", values)
+        return Report(self._last.level, self._last.message, values)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Runs the learner."""
+    lifetime.run(LearnerNode, args, threads=_THREADS)
+
+
+if __name__ == "__main__":
+    main()

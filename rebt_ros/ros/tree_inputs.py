@@ -1,0 +1,107 @@
+"""The state as a running tree needs it, without ROS: topics that it reads, and their freshness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.runtime import StateEncoder
+from rebt_ros.demonstration.builder import BadMessage, Fault
+from rebt_ros.logic.conditions import LastActionIs
+
+
+class Message(NamedTuple):
+    """A state message that was accepted."""
+
+    values: Sequence[float]
+    received: int
+    """Nanoseconds."""
+
+
+class TreeInputs:
+    """The latest values of the features that a tree tests; others need not be published at all.
+
+    Times are nanoseconds of one clock.
+
+    Args:
+        learned: The tree and its features.
+        default_topic: Topic of features that came from a table, in their order there.
+        timeout: How long a message stays fresh.
+    """
+
+    def __init__(self, learned: LearnedTree, default_topic: str, timeout: int) -> None:
+        tested = {
+            one.literal.condition.feature
+            for one in nodes.conditions(learned.tree)
+            if not isinstance(one.literal.condition, LastActionIs)
+        }
+        self._read = {
+            place: replace(
+                feature,
+                topic=feature.topic or default_topic,
+                index=place if feature.index is None else feature.index,
+            )
+            for place, feature in enumerate(learned.features)
+            if feature.name in tested
+        }
+        self._encoder = StateEncoder(tuple(self._read.values()))
+        self._state = [math.nan] * len(learned.features)
+        self._timeout = timeout
+        self._latest: dict[str, Message] = {}
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The state topics that the tree reads."""
+        return tuple(self._encoder.topics)
+
+    @property
+    def latest(self) -> Mapping[str, Message]:
+        """The newest message of each topic."""
+        return self._latest
+
+    def accept(self, topic: str, message: Message) -> None:
+        """Takes a message of one of the topics.
+
+        Raises:
+            BadMessage: It has too few values, or one that the tree tests is not finite; it is
+                left out, so that the topic goes stale unless a better one follows.
+        """
+        needed = self._encoder.topics[topic]
+        if len(message.values) < needed:
+            raise BadMessage(
+                Fault.LENGTH,
+                f"state topic {topic!r} sent {len(message.values)} values where the tree needs "
+                f"{needed}: publish what was published when it was demonstrated.",
+            )
+        for feature in self._read.values():
+            assert feature.index is not None
+            if feature.topic == topic and not math.isfinite(message.values[feature.index]):
+                raise BadMessage(
+                    Fault.NOT_FINITE,
+                    f"state topic {topic!r} sent {message.values[feature.index]} for feature "
+                    f"{feature.name!r}: replace it with a finite number before publishing.",
+                )
+        self._latest[topic] = message
+
+    def stale(self, now: int) -> dict[str, str]:
+        """The topics without a fresh message, and the age of their last one, in words."""
+        stale: dict[str, str] = {}
+        for topic in self._encoder.topics:
+            message = self._latest.get(topic)
+            if message is None:
+                stale[topic] = "never received"
+            # A negative age is that of a clock that was set back.
+            elif not 0 <= now - message.received <= self._timeout:
+                stale[topic] = f"{(now - message.received) / 1e9:.1f} s old"
+        return stale
+
+    def state(self) -> Sequence[float]:
+        """The encoded state for `TreeRuntime.tick`, once every topic has sent a message."""
+        values = self._encoder.encode({topic: one.values for topic, one in self._latest.items()})
+        for place, value in zip(self._read, values, strict=True):
+            self._state[place] = value
+        return self._state
