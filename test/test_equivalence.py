@@ -16,8 +16,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rebt_ros.algorithms.priority_root import Reductions, reduced_tree
 from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
-from rebt_ros.algorithms.rules import delta_close
+from rebt_ros.algorithms.rules import delta_close, leaf_rules
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
@@ -162,6 +163,30 @@ def test_the_behavior_tree_chooses_what_the_decision_tree_predicts_at_every_feas
     step = 1 + len(feasible) // 300
     wanted = [[LABELS[code]] for code in expected[::step]]
     assert ticked_by_runtime(learned, every(feasible, step)) == wanted
+    assert ticked_by_runtime(loads(dumps(learned)), every(feasible, step)) == wanted
+
+
+@pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])
+@pytest.mark.parametrize(
+    "reductions", [Reductions(*flags) for flags in itertools.product((True, False), repeat=3)]
+)
+@settings(max_examples=12, deadline=None)
+@given(table=tables())
+def test_a_reduced_tree_chooses_what_the_decision_tree_predicts_at_every_feasible_state(
+    reductions: Reductions, root: Root, table: DemonstrationTable
+) -> None:
+    trained = train(table, last_action=True, max_depth=5)
+    rules = leaf_rules(trained.tree, lambda leaf: (leaf.most_probable,))
+    learned = as_learned(reduced_tree(rules, reductions, root), trained)
+    feasible = feasible_states(trained.tree, table)
+    expected = trained.predict(feasible)
+    assert predicted_by_tree(learned.tree, trained, feasible) == expected.tolist()
+    if root is Root.PARALLEL:
+        column = last_action_column(LABELS, feasible.last)
+        ticked = triggered(learned.tree, States(FEATURES, feasible.states, column))
+        assert (np.sum(list(ticked.values()), axis=0) == 1).all()
+    step = 1 + len(feasible) // 100
+    wanted = [[LABELS[code]] for code in expected[::step]]
     assert ticked_by_runtime(loads(dumps(learned)), every(feasible, step)) == wanted
 
 

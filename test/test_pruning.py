@@ -1,0 +1,94 @@
+"""The pruning levels of one fit are the trees that scikit-learn fits for each ccp_alpha."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn.tree import DecisionTreeClassifier
+
+from rebt_ros.decision_tree.encoding import encode
+from rebt_ros.decision_tree.training import fit
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.table import DemonstrationTable
+
+
+def noisy_table(seed: int, rows: int, decimals: int = 1) -> DemonstrationTable:
+    """Few distinct values, so that there are ties between splits and between links."""
+    random = np.random.default_rng(seed)
+    states = np.round(random.normal(size=(rows, 4)), decimals)
+    chosen = (states[:, 0] > 0) + (states[:, 1] > 0.5) + (random.random(rows) < 0.15)
+    return DemonstrationTable(
+        channel="action",
+        features=tuple(Feature(name) for name in "abcd"),
+        states=states,
+        actions=("go", "grasp", "turn", "wait"),
+        chosen=chosen.astype(np.int64),
+        demonstrations=("one",),
+        demonstration=np.zeros(rows, dtype=np.int64),
+        stamps=np.arange(rows),
+    )
+
+
+tables = st.builds(
+    noisy_table, st.integers(0, 10_000), st.integers(2, 150), st.sampled_from((0, 1, 3))
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(table=tables, last_action=st.booleans(), max_depth=st.sampled_from((None, 3)))
+def test_every_level_equals_scikit_learns_own_fit_at_its_alpha(
+    table: DemonstrationTable, last_action: bool, max_depth: int | None
+) -> None:
+    fitted = fit(table, last_action=last_action, max_depth=max_depth)
+    matrix = encode(table, last_action)
+    for ccp_alpha in fitted.path.alphas:
+        own = DecisionTreeClassifier(max_depth=max_depth, ccp_alpha=ccp_alpha, random_state=0)
+        own.fit(matrix, table.chosen)
+        level = fitted.at(ccp_alpha)
+        assert sum(1 for _ in level.tree.paths()) == own.get_n_leaves()
+        assert (level.predict(table) == own.predict(matrix)).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(table=tables)
+def test_the_levels_are_the_positive_alphas_of_scikit_learns_path(
+    table: DemonstrationTable,
+) -> None:
+    path = DecisionTreeClassifier(random_state=0).cost_complexity_pruning_path(
+        encode(table, last_action=False), table.chosen
+    )
+    alphas = fit(table, last_action=False).path.alphas
+    assert alphas[0] == 0.0
+    assert (np.diff(alphas) > 0).all()
+    np.testing.assert_allclose(
+        alphas[1:], np.unique(np.maximum.accumulate(path.ccp_alphas)[path.ccp_alphas > 0])
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(table=tables, other=tables)
+def test_agreements_of_all_levels_at_once_equal_those_of_each_tree(
+    table: DemonstrationTable, other: DemonstrationTable
+) -> None:
+    fitted = fit(table, last_action=True)
+    # Between the levels as well as on them, and beyond the last one.
+    alphas = np.unique(np.concatenate((fitted.path.alphas, fitted.path.alphas * 1.5, [0.7])))
+    each = [np.mean(fitted.at(one).predict(other) == other.chosen) for one in alphas]
+    np.testing.assert_allclose(fitted.agreements(other, alphas), each)
+
+
+def test_the_last_level_is_a_single_leaf_with_the_most_frequent_action() -> None:
+    table = noisy_table(1, 100)
+    fitted = fit(table, last_action=False)
+    last = fitted.at(float(fitted.path.alphas[-1]))
+    assert [len(conjunction) for conjunction, _ in last.tree.paths()] == [0]
+    assert (last.predict(table) == np.bincount(table.chosen).argmax()).all()
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_tree_without_splits_has_one_level(rows: int) -> None:
+    table = noisy_table(3, rows)
+    same = table.where(table.chosen == table.chosen[0])
+    assert fit(same, last_action=False).path.alphas.tolist() == [0.0]
