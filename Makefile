@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test lint format clean
+.PHONY: help setup build demo test bench-reduction lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -20,7 +20,7 @@ QUIET := desktop_notification- status-
 SOURCES := rebt_ros test setup.py .ci
 
 help: ## Show this list.
-	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
 
 setup: ## Make .venv with everything needed; once per change of the dependencies.
 	@.ci/setup.sh
@@ -44,6 +44,9 @@ test: build ## Run the tests on the built package.
 	$(COLCON) test-result --test-result-base build/rebt_ros --verbose || status=$$?; \
 	$(VENV_PYTHON) .ci/count_tests.py build/rebt_ros/pytest.xml || status=$$?; \
 	exit $$status
+
+bench-reduction: setup ## Compare the sizes of BT-Espresso's trees and ours (ARGS="..." for options).
+	@$(VENV_PYTHON) -m rebt_ros.commands.bench_reduction ../shared/experiments $(ARGS)
 
 lint: setup ## Check style, formatting and types.
 	@status=0; \

@@ -218,15 +218,16 @@ class Peer:
     ) -> Float64MultiArray:
         message = Float64MultiArray(data=list(values))
         message.layout.dim = [MultiArrayDimension(label=label) for label in labels]
-        self._send(Float64MultiArray, topic, message)
+        self.publish(message, topic)
         return message
 
     def action(self, label: str, topic: str = "action") -> None:
-        self._send(String, topic, String(data=label))
+        self.publish(String(data=label), topic)
 
-    def _send(self, kind: type, topic: str, message: Any) -> None:
+    def publish(self, message: Any, topic: str) -> None:
+        """Publishes; the first message of a topic waits until all subscribers have it."""
         first = topic not in self._publishers
-        publisher = self.connect(kind, topic)
+        publisher = self.connect(type(message), topic)
         publisher.publish(message)
         if first:
             # A subscriber that is known here may not know of this publisher yet: until it does,

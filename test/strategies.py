@@ -354,13 +354,13 @@ def learned_trees(draw: st.DrawFn) -> LearnedTree:
         names,
         st.sampled_from(SuggestionKind),
         st.integers(0, 10**6),
-        trees(leaves, max_leaves=4),
+        trees(leaves, max_leaves=3),
         st.booleans(),
     )
     return LearnedTree(
         declared,
         tuple(actions),
-        draw(trees(leaves)),
+        draw(trees(leaves, max_leaves=8)),
         draw(provenances),
         tuple(draw(st.lists(suggestions, max_size=2))),
     )

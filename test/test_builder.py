@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -302,7 +303,7 @@ def test_a_slow_grid_is_not_made_faster_by_slow_states() -> None:
         for row in builder.observe(number * 3 * SECOND // 2, "state", [float(number)])
     ]
     assert 6 <= len(taken) <= 7
-    assert all(later - earlier >= 10 for earlier, later in zip(taken, taken[1:], strict=False))
+    assert all(later - earlier >= 10 for earlier, later in pairwise(taken))
 
 
 def test_a_clock_that_is_set_back_starts_the_grid_anew() -> None:

@@ -12,7 +12,9 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from builtin_interfaces.msg import Time
 from ros_processes import NodeProcess, Peer, own_domain, values_of
+from rosgraph_msgs.msg import Clock
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.last_action import last_actions
@@ -219,6 +221,22 @@ def test_a_held_action_is_sampled_at_the_rate_asked_for(
     (demonstration,) = _recorded(tmp_path / "demonstrations")
     assert set(_actions(demonstration)) == {"go"}
     assert np.diff(demonstration.stamps)[:20].tolist() == [10_000_000] * 20
+
+
+def test_rows_carry_simulated_time_where_it_is_in_use(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("recorder_node", domain, tmp_path, {"use_sim_time": True}):
+        peer.state(1.0)
+
+        def stamped() -> bool:
+            peer.publish(Clock(clock=Time(sec=5)), "/clock")
+            peer.action("go")
+            return any(
+                "\n5000000000," in one.read_text() for one in tmp_path.glob("demonstrations/*.csv")
+            )
+
+        peer.wait_until(stamped)
 
 
 def test_recording_goes_on_once_there_is_room_again(

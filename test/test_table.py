@@ -107,8 +107,9 @@ KINDS = Feature("f0", CATEGORICAL, ("box", "cup"))
 @pytest.mark.parametrize(
     ("demonstration", "declared", "message"),
     [
-        (column([0, 2]), {"f0": BINARY}, "'f0' cannot be binary: it holds 0, 2"),
-        (column([0.5]), {"f0": BINARY}, "'f0' cannot be binary: it holds 0.5"),
+        (column([0, 2]), {"f0": BINARY}, r"'f0' cannot be binary: it holds 0, 2\."),
+        (column([0.5]), {"f0": BINARY}, r"'f0' cannot be binary: it holds 0\.5\."),
+        (column([1, 2, 3, 4]), {"f0": BINARY}, r"it holds 1, 2, 3, …\."),
         (column([0, 1], KINDS), {"f0": NUMERIC}, "'f0' cannot be numeric: it holds text"),
         (column([0, 1], KINDS), {"f0": BINARY}, "'f0' cannot be binary: it holds text"),
         (column([math.nan]), {"f0": CATEGORICAL}, "'f0' cannot be categorical: it holds nothing"),
@@ -120,7 +121,7 @@ def test_a_kind_that_does_not_fit_is_refused(
 ) -> None:
     with pytest.raises(OptionError, match=message) as refusal:
         tabulate([demonstration], declared)
-    assert str(refusal.value).endswith((".", "…"))
+    assert str(refusal.value).endswith(".")
 
 
 def test_a_column_of_text_may_be_all_missing_in_the_rows() -> None:

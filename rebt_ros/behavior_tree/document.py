@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+import reprlib
 from collections.abc import Callable, Mapping
 from enum import Enum
 from importlib import resources
@@ -17,6 +18,7 @@ from typing import Any, NoReturn, TypeAlias, TypeVar
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import (
+    ChannelProvenance,
     Figures,
     LearnedTree,
     Provenance,
@@ -42,6 +44,11 @@ VERSION = 1
 LARGEST_DOCUMENT = 16_000_000
 #: Longest way from a tree's root to a leaf, in nodes.
 DEEPEST_TREE = 100
+
+#: Shows the beginning of large values, and not more than a few levels of nested ones.
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel = 3
+_SHORT.maxstring = 60
 
 Json: TypeAlias = dict[str, Any]
 _T = TypeVar("_T")
@@ -80,12 +87,17 @@ def loads(text: str) -> LearnedTree:
             f"the document has {len(text)} characters: at most {LARGEST_DOCUMENT} are read."
         )
     try:
-        value = json.loads(text, parse_constant=_refuse_constant)
+        return _learned_tree(_Place(_json(text), "document"))
     except RecursionError as err:
         raise DocumentError("the document is nested too deeply to be read.") from err
+
+
+def _json(text: str) -> object:
+    try:
+        value: object = json.loads(text, parse_constant=_refuse_constant)
     except ValueError as err:
         raise DocumentError(f"the document is not JSON: {err}.") from err
-    return _learned_tree(_Place(value, "document"))
+    return value
 
 
 def _refuse_constant(name: str) -> NoReturn:
@@ -114,8 +126,7 @@ def _encode(learned: LearnedTree) -> Json:
 
 
 def _encode_provenance(provenance: Provenance) -> Json:
-    figures = provenance.figures
-    return {
+    encoded: Json = {
         "demonstrations": provenance.demonstrations,
         "rows": provenance.rows,
         "delta": provenance.delta,
@@ -123,12 +134,28 @@ def _encode_provenance(provenance: Provenance) -> Json:
         "ccp_alpha": provenance.ccp_alpha,
         "root": provenance.root.value,
         "uses_last_action": provenance.uses_last_action,
-        "figures": {
-            "fidelity_mismatches": figures.fidelity_mismatches,
-            "teacher_forced_agreement": figures.teacher_forced_agreement,
-            "own_history_agreement": figures.own_history_agreement,
-            "held_out_rows": figures.held_out_rows,
-        },
+        "figures": _encode_figures(provenance.figures),
+    }
+    if provenance.channels:
+        encoded["channels"] = [
+            {
+                "channel": one.channel,
+                "rows": one.rows,
+                "ccp_alpha": one.ccp_alpha,
+                "uses_last_action": one.uses_last_action,
+                "figures": _encode_figures(one.figures),
+            }
+            for one in provenance.channels
+        ]
+    return encoded
+
+
+def _encode_figures(figures: Figures) -> Json:
+    return {
+        "fidelity_mismatches": figures.fidelity_mismatches,
+        "teacher_forced_agreement": figures.teacher_forced_agreement,
+        "own_history_agreement": figures.own_history_agreement,
+        "held_out_rows": figures.held_out_rows,
     }
 
 
@@ -169,6 +196,15 @@ def _encode_condition(condition: Condition) -> Json:
             return {"type": "last_action_is", "action": action, "deciding": list(deciding)}
 
 
+def _shown(value: object) -> str:
+    """A value for a message, in as little room and time as it takes to recognize it."""
+    return _cut(_SHORT.repr(value), 60)
+
+
+def _cut(text: str, length: int) -> str:
+    return text if len(text) <= length else f"{text[:length]}…"
+
+
 class _Place:
     """A value of the document and the way to it, for messages."""
 
@@ -177,9 +213,7 @@ class _Place:
         self.path = path
 
     def refuse(self, expected: str) -> NoReturn:
-        shown = repr(self.value)
-        shown = shown if len(shown) <= 60 else f"{shown[:60]}…"
-        raise DocumentError(f"{self.path} must be {expected}, not {shown}.")
+        raise DocumentError(f"{self.path} must be {expected}, not {_shown(self.value)}.")
 
     def fields(self, *required: str, optional: tuple[str, ...] = ()) -> dict[str, _Place]:
         """The fields of an object that has all of `required` and nothing unknown."""
@@ -190,7 +224,7 @@ class _Place:
         if missing:
             raise DocumentError(f"{self.path} lacks {missing[0]!r}.")
         if unknown:
-            raise DocumentError(f"{self.path} has the unknown field {unknown[0]!r}.")
+            raise DocumentError(f"{self.path} has the unknown field {_shown(unknown[0])}.")
         return {name: _Place(value, f"{self.path}.{name}") for name, value in self.value.items()}
 
     def items(self, read: Callable[[_Place], _T], least: int = 0) -> tuple[_T, ...]:
@@ -256,7 +290,7 @@ def _learned_tree(place: _Place) -> LearnedTree:
         raise DocumentError(f"the document does not say that its format is {FORMAT!r}.")
     if place.value.get("version") != VERSION or isinstance(place.value["version"], bool):
         raise DocumentError(
-            f"the document has version {place.value.get('version')!r}: "
+            f"the document has version {_shown(place.value.get('version'))}: "
             f"this release of rebt_ros reads version {VERSION}."
         )
     fields = place.fields(
@@ -271,7 +305,7 @@ def _learned_tree(place: _Place) -> LearnedTree:
             suggestions=fields["suggestions"].items(_suggestion),
         )
     except ValueError as err:
-        raise DocumentError(f"the document contradicts itself: {err}.") from err
+        raise DocumentError(f"the document contradicts itself: {_cut(str(err), 200)}.") from err
 
 
 def _feature(place: _Place) -> Feature:
@@ -312,6 +346,7 @@ def _provenance(place: _Place) -> Provenance:
         "root",
         "uses_last_action",
         "figures",
+        optional=("channels",),
     )
     return Provenance(
         demonstrations=fields["demonstrations"].whole(),
@@ -320,6 +355,18 @@ def _provenance(place: _Place) -> Provenance:
         max_depth=fields["max_depth"].or_null(lambda: fields["max_depth"].whole(1)),
         ccp_alpha=fields["ccp_alpha"].number(0),
         root=fields["root"].one_of(Root),
+        uses_last_action=fields["uses_last_action"].truth(),
+        figures=_figures(fields["figures"]),
+        channels=fields["channels"].items(_channel) if "channels" in fields else (),
+    )
+
+
+def _channel(place: _Place) -> ChannelProvenance:
+    fields = place.fields("channel", "rows", "ccp_alpha", "uses_last_action", "figures")
+    return ChannelProvenance(
+        channel=fields["channel"].text(),
+        rows=fields["rows"].whole(),
+        ccp_alpha=fields["ccp_alpha"].number(0),
         uses_last_action=fields["uses_last_action"].truth(),
         figures=_figures(fields["figures"]),
     )
@@ -355,7 +402,7 @@ def _node(place: _Place, levels: int) -> nodes.Node:
         return nodes.Inverter(_node(place.fields("type", "child")["child"], levels - 1))
     composite = _COMPOSITES.get(kind)
     if composite is None:
-        raise DocumentError(f"{place.path} has the unknown type {kind!r}.")
+        raise DocumentError(f"{place.path} has the unknown type {_shown(kind)}.")
     remembering = composite is nodes.Sequence or composite is nodes.Selector
     fields = place.fields("type", "children", optional=("memory",) if remembering else ())
     children = fields["children"].items(lambda child: _node(child, levels - 1), least=1)
@@ -383,4 +430,4 @@ def _condition(place: _Place) -> Condition:
             deciding = fields["deciding"].items(_Place.text)
             return LastActionIs(fields["action"].text(), deciding)
         case unknown:
-            raise DocumentError(f"{place.path} has the unknown type {unknown!r}.")
+            raise DocumentError(f"{place.path} has the unknown type {_shown(unknown)}.")

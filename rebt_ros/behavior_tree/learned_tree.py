@@ -53,8 +53,19 @@ class Figures:
 
 
 @dataclass(frozen=True, slots=True)
+class ChannelProvenance:
+    """Where the policy of one channel came from, if there are several."""
+
+    channel: str
+    rows: int
+    ccp_alpha: float
+    uses_last_action: bool
+    figures: Figures
+
+
+@dataclass(frozen=True, slots=True)
 class Provenance:
-    """Where a tree came from."""
+    """Where a tree came from; with several channels, figures are over all of them."""
 
     demonstrations: int
     rows: int
@@ -65,6 +76,8 @@ class Provenance:
     uses_last_action: bool
     """Whether the decision tree was shown LAT."""
     figures: Figures
+    channels: tuple[ChannelProvenance, ...] = ()
+    """Of each channel, where there are several."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,29 +101,31 @@ class LearnedTree:
             raise ValueError(problem)
 
     def _problems(self) -> Iterator[str]:
-        features = {feature.name: feature for feature in self.features}
-        if len(features) != len(self.features):
+        # Documents come from outside, so looking up must not take long however much they declare.
+        actions = frozenset(self.actions)
+        labels = {action.label for action in actions}
+        categories = {one.name: frozenset(one.categories) for one in self.features}
+        if len(categories) != len(self.features):
             yield "two features have the same name"
-        labels = {action.label for action in self.actions}
         for tree in (self.tree, *(suggestion.subtree for suggestion in self.suggestions)):
             for action in nodes.actions(tree):
-                if action not in self.actions:
+                if action not in actions:
                     yield f"action {action.label!r} on {action.channel!r} is not declared"
             for condition in nodes.conditions(tree):
-                yield from _problems_of(condition, features, labels)
+                yield from _problems_of(condition, categories, labels)
 
 
 def _problems_of(
-    node: nodes.Condition, features: dict[str, Feature], labels: set[str]
+    node: nodes.Condition, categories: dict[str, frozenset[str]], labels: set[str]
 ) -> Iterator[str]:
     match node.literal.condition:
         case Threshold(feature=name) | IsTrue(feature=name):
-            if name not in features:
+            if name not in categories:
                 yield f"feature {name!r} is not declared"
         case HasCategory(feature=name, category=category):
-            if name not in features:
+            if name not in categories:
                 yield f"feature {name!r} is not declared"
-            elif category not in features[name].categories:
+            elif category not in categories[name]:
                 yield f"feature {name!r} has no category {category!r}"
         case LastActionIs(action=action, deciding=deciding):
             for label in (action, *deciding):

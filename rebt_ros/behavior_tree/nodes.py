@@ -128,3 +128,16 @@ def actions(node: Node) -> tuple[Action, ...]:
 def conditions(node: Node) -> tuple[Condition, ...]:
     """Each condition of the tree once, in the order in which it first occurs."""
     return tuple(dict.fromkeys(one for one in walk(node) if isinstance(one, Condition)))
+
+
+def policies(node: Node) -> dict[str, Node]:
+    """The tree of each channel.
+
+    Channels act side by side under a root Parallel with one child for each.  A Parallel whose
+    children share a channel is the root of one policy, with a child for each rule.
+    """
+    if isinstance(node, Parallel):
+        channels = [{action.channel for action in actions(child)} for child in node.children]
+        if all(len(one) == 1 for one in channels) and len(set.union(*channels)) == len(channels):
+            return {one.pop(): child for one, child in zip(channels, node.children, strict=True)}
+    return {action.channel: node for action in actions(node)[:1]}

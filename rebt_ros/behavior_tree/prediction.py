@@ -99,12 +99,13 @@ def choose(tree: nodes.Node, actions: tuple[nodes.Action, ...], states: States) 
         states: The rows to evaluate.
 
     Returns:
-        Positions in `actions`, shape (rows,); `NO_ACTION` where the tree takes none.  Where a
-        Parallel takes several, it is the first that the tree names.
+        Positions in `actions`, shape (rows,); `NO_ACTION` where the tree takes none of them.  Where
+        a Parallel takes several, it is the first that the tree names.
     """
     chosen = np.full(len(states), NO_ACTION, dtype=np.int64)
     for action, ticked in triggered(tree, states).items():
-        chosen[ticked & (chosen == NO_ACTION)] = actions.index(action)
+        if action in actions:
+            chosen[ticked & (chosen == NO_ACTION)] = actions.index(action)
     return chosen
 
 

@@ -65,8 +65,11 @@ def executable(tree: nodes.Node) -> nodes.Node:
     """The tree as a robot runs it: a root Parallel becomes a memoryless Selector.
 
     A Parallel fails, and halts the actions that run, as soon as one child fails; under a root
-    Parallel all rules but one fail at every tick.
+    Parallel all rules but one fail at every tick.  A Parallel over channels stays one.
     """
+    side_by_side = nodes.policies(tree)
+    if len(side_by_side) > 1:
+        return nodes.Parallel(tuple(map(executable, side_by_side.values())))
     return nodes.Selector(tree.children) if isinstance(tree, nodes.Parallel) else tree
 
 
@@ -96,9 +99,7 @@ class TreeRuntime:
         self._ticked: list[nodes.Action] = []
         self._wording = Wording(learned)
         self._place = {feature.name: place for place, feature in enumerate(learned.features)}
-        # The learner refuses demonstrations of several channels, so there is one history.
-        self._history = next(iter(self.histories.values()))
-        self._behaviours = self._build(learned.tree if tree is None else tree)
+        self._behaviours = self._build_root(learned.tree if tree is None else tree)
         self.root = self._behaviours[0]
 
     def tick(self, state: Sequence[float]) -> Tick:
@@ -124,18 +125,41 @@ class TreeRuntime:
         """The status name of every node, each parent before its children."""
         return tuple(behaviour.status.name for behaviour in self._behaviours)
 
-    def _build(self, node: nodes.Node) -> list[py_trees.behaviour.Behaviour]:
+    def _build_root(self, tree: nodes.Node) -> list[py_trees.behaviour.Behaviour]:
+        side_by_side = nodes.policies(tree)
+        if len(side_by_side) < 2:
+            channels = [*side_by_side, *self.histories]
+            return self._build(tree, self.histories[channels[0]])
+        families = [
+            self._build(child, self.histories[channel]) for channel, child in side_by_side.items()
+        ]
+        # A channel that has nothing to do must not halt what runs on another one.
+        never_failing = [
+            py_trees.decorators.FailureIsSuccess(name=channel, child=family[0])
+            for channel, family in zip(side_by_side, families, strict=True)
+        ]
+        own = _parallel(self._wording.node(tree), never_failing)
+        return [own, *(one for family in families for one in family)]
+
+    def _build(
+        self, node: nodes.Node, history: ActionHistory
+    ) -> list[py_trees.behaviour.Behaviour]:
         """The behaviours of the node and all its descendants, each parent before its children."""
-        families = [self._build(child) for child in nodes.children(node)]
-        own = self._behaviour(self._wording.node(node), node, [family[0] for family in families])
+        families = [self._build(child, history) for child in nodes.children(node)]
+        children = [family[0] for family in families]
+        own = self._behaviour(self._wording.node(node), node, children, history)
         return [own, *(one for family in families for one in family)]
 
     def _behaviour(
-        self, name: str, node: nodes.Node, children: list[py_trees.behaviour.Behaviour]
+        self,
+        name: str,
+        node: nodes.Node,
+        children: list[py_trees.behaviour.Behaviour],
+        history: ActionHistory,
     ) -> py_trees.behaviour.Behaviour:
         match node:
             case nodes.Condition(literal=literal):
-                return _Test(name, self._test(literal))
+                return _Test(name, self._test(literal, history))
             case nodes.Action():
                 return _Command(name, node, self._commander, self._ticked)
             case nodes.Inverter():
@@ -147,19 +171,18 @@ class TreeRuntime:
             case nodes.ParallelSelector():
                 return py_trees.composites.Selector(name, False, children)
             case nodes.Parallel():
-                policy = py_trees.common.ParallelPolicy.SuccessOnAll(synchronise=False)
-                return py_trees.composites.Parallel(name, policy, children)
+                return _parallel(name, children)
             case nodes.Repeater():
                 sequence = py_trees.composites.Sequence(name, True, children)
                 return py_trees.decorators.Repeat(name=name, child=sequence, num_success=-1)
 
-    def _test(self, literal: Literal) -> Callable[[], bool]:
-        holds = self._test_condition(literal.condition)
+    def _test(self, literal: Literal, history: ActionHistory) -> Callable[[], bool]:
+        holds = self._test_condition(literal.condition, history)
         return holds if literal.positive else lambda: not holds()
 
-    def _test_condition(self, condition: Condition) -> Callable[[], bool]:
+    def _test_condition(self, condition: Condition, history: ActionHistory) -> Callable[[], bool]:
         if isinstance(condition, LastActionIs):
-            action, deciding, history = condition.action, condition.deciding, self._history
+            action, deciding = condition.action, condition.deciding
             return lambda: history.before(*deciding) == action
         place = self._place[condition.feature]
         match condition:
@@ -167,9 +190,16 @@ class TreeRuntime:
                 return lambda: self._state[place] <= value
             case IsTrue():
                 return lambda: self._state[place] == 1
-            case HasCategory(feature=feature, category=name):
+            case HasCategory(category=name):
                 code = self.learned.features[place].categories.index(name)
                 return lambda: self._state[place] == code
+
+
+def _parallel(
+    name: str, children: list[py_trees.behaviour.Behaviour]
+) -> py_trees.composites.Parallel:
+    policy = py_trees.common.ParallelPolicy.SuccessOnAll(synchronise=False)
+    return py_trees.composites.Parallel(name, policy, children)
 
 
 class _Test(py_trees.behaviour.Behaviour):

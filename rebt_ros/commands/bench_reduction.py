@@ -10,10 +10,11 @@ import argparse
 import json
 import re
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import joblib
 import numpy as np
@@ -39,9 +40,7 @@ _MAX_DEPTH = 5
 
 _MODES: dict[str, Callable[[DecisionTree], nodes.Node]] = {
     "paper": lambda tree: re_bt_espresso(tree, delta=0.0),
-    "default": lambda tree: priority_selector(
-        leaf_rules(tree, lambda leaf: (leaf.most_probable,))
-    ),
+    "default": lambda tree: priority_selector(leaf_rules(tree, lambda leaf: (leaf.most_probable,))),
 }
 
 
@@ -137,20 +136,31 @@ def _bench(parsed: argparse.Namespace) -> None:
         progress.clear()
     seconds = time.monotonic() - start
     figures = {
-        mode: summarize([one for result in results for one in result.comparisons[mode]])
+        mode: Figures.of([one for result in results for one in result.comparisons[mode]])
         for mode in _MODES
     }
     rows = sum(result.rows for result in results)
-    settings = {"ticks": parsed.ticks, "seed": parsed.seed, "max_depth": _MAX_DEPTH}
-    work = {"configurations": len(configs), "rows": rows, "seconds": round(seconds, 1)}
-    write_text_atomically(parsed.out, json.dumps(figures | settings | work, indent=1) + "\n")
+    settings: dict[str, Any] = {"ticks": parsed.ticks, "seed": parsed.seed, "max_depth": _MAX_DEPTH}
+    work: dict[str, Any] = {
+        "configurations": len(configs),
+        "rows": rows,
+        "seconds": round(seconds, 1),
+    }
+    modes = {mode: one.encoded() for mode, one in figures.items()}
+    write_text_atomically(parsed.out, json.dumps(modes | settings | work, indent=1) + "\n")
     skipped = [note for config in configs for note in config.notes]
     if skipped:
         print(f"note: {len(skipped)} nodes without meaning were skipped, such as: {skipped[0]}.")
+    some = figures["default"]
+    if some.single_node_baselines:
+        print(
+            f"note: {some.single_node_baselines} of the trees, whose leaves all choose one action, "
+            "are a single node with BT-Espresso already and count as not reduced."
+        )
     print(_table(figures))
     print(
-        f"{len(configs)} configurations, {parsed.ticks} ticks each, {rows} rows, "
-        f"{seconds:.0f} s. Written to {parsed.out}."
+        f"Trees compared: {some.trees}; {len(configs)} configurations, "
+        f"{parsed.ticks} ticks each, {rows} rows; {seconds:.0f} s. Written to {parsed.out}."
     )
 
 
@@ -160,22 +170,22 @@ def read_configs(directory: Path) -> list[ExperimentConfig]:
     Raises:
         InputError: There are none, or one is malformed.
     """
-    paths = sorted(
-        directory.glob("*.json"),
-        key=lambda path: [int(part) if part.isdigit() else part for part in _parts(path.stem)],
-    )
+    paths = sorted(directory.glob("*.json"), key=lambda path: _by_number(path.stem))
     if not paths:
         raise InputError(f"{directory} has no configuration files: name a directory of *.json.")
     return [parse_config(read_text(path), path.stem) for path in paths]
 
 
-def _parts(name: str) -> list[str]:
-    """Texts and numbers by turns, beginning with a text.
+def _by_number(name: str) -> list[tuple[str, int]]:
+    """Sorts names by the numbers in them.
 
-    >>> _parts("expr10")
-    ['expr', '10', '']
+    >>> sorted(["expr10", "expr9"], key=_by_number)
+    ['expr9', 'expr10']
     """
-    return re.split(r"([0-9]+)", name)
+    parts = re.split(r"([0-9]+)", name)
+    return [
+        (text, int(number)) for text, number in zip(parts[::2], [*parts[1::2], "0"], strict=True)
+    ]
 
 
 def compare(config: ExperimentConfig, ticks: int, seed: int) -> ConfigurationResult:
@@ -202,52 +212,83 @@ def compare(config: ExperimentConfig, ticks: int, seed: int) -> ConfigurationRes
     return ConfigurationResult(len(table), comparisons)
 
 
-def summarize(comparisons: Sequence[Comparison]) -> dict[str, float | dict[str, float]]:
-    """The figures of one mode, reductions in per cent.
+@dataclass(frozen=True, slots=True)
+class Reductions:
+    """How the relative reductions of many trees are distributed, in per cent."""
 
-    Raises:
-        InputError: There is nothing to compare.
-    """
-    if not comparisons:
-        raise InputError("no decision tree had more than one leaf: simulate more ticks.")
-    return {
-        **_distribution([one.reduction for one in comparisons]),
-        "mismatches": sum(one.mismatches for one in comparisons),
-        "trees": len(comparisons),
-        "as_emitted": _distribution([one.reduction_as_emitted for one in comparisons]),
-    }
+    median: float
+    maximum: float
+    share_reduced: float
+    """Trees that got smaller at all."""
 
+    @classmethod
+    def of(cls, reductions: Sequence[float]) -> Reductions:
+        """The distribution of at least one reduction."""
+        reduced = sum(reduction > 0 for reduction in reductions)
+        share = 100 * reduced / len(reductions)
+        return cls(round(median(reductions), 2), round(max(reductions), 2), round(share, 2))
 
-def _distribution(reductions: Sequence[float]) -> dict[str, float]:
-    reduced = sum(reduction > 0 for reduction in reductions)
-    return {
-        "median": round(median(reductions), 2),
-        "maximum": round(max(reductions), 2),
-        "share_reduced": round(100 * reduced / len(reductions), 2),
-    }
+    def cells(self) -> tuple[str, str, str]:
+        """For a table."""
+        return f"{self.median:.2f} %", f"{self.maximum:.2f} %", f"{self.share_reduced:.2f} %"
 
 
-def _table(figures: dict[str, dict[str, float | dict[str, float]]]) -> str:
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """The figures of one mode."""
+
+    reductions: Reductions
+    as_emitted: Reductions
+    """Inverters counted."""
+    mismatches: int
+    trees: int
+    single_node_baselines: int
+    """Trees that BT-Espresso makes a single action already: no mode can reduce them."""
+
+    @classmethod
+    def of(cls, comparisons: Sequence[Comparison]) -> Figures:
+        """The figures of a mode's comparisons.
+
+        Raises:
+            InputError: There are none.
+        """
+        if not comparisons:
+            raise InputError("no decision tree had more than one leaf: simulate more ticks.")
+        return cls(
+            Reductions.of([one.reduction for one in comparisons]),
+            Reductions.of([one.reduction_as_emitted for one in comparisons]),
+            sum(one.mismatches for one in comparisons),
+            len(comparisons),
+            sum(one.baseline.emitted == 1 for one in comparisons),
+        )
+
+    def encoded(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            **asdict(self.reductions),
+            "mismatches": self.mismatches,
+            "trees": self.trees,
+            "single_node_baselines": self.single_node_baselines,
+            "as_emitted": asdict(self.as_emitted),
+        }
+
+
+def _table(figures: Mapping[str, Figures]) -> str:
     """The figures for a person to read."""
-    lines = [("fewer nodes than BT-Espresso", "median", "maximum", "trees reduced", "mismatches")]
-    for mode, figure in figures.items():
-        emitted = figure["as_emitted"]
-        assert isinstance(emitted, dict)
-        lines.append((f"{mode} mode", *_percentages(figure), str(figure["mismatches"])))
-        lines.append((f"{mode} mode, Inverters counted", *_percentages(emitted), ""))
-    lines.append(("trees compared", "", "", str(next(iter(figures.values()))["trees"]), ""))
+    lines: list[tuple[str, ...]] = [
+        ("nodes saved against BT-Espresso", "median", "maximum", "trees reduced", "mismatches")
+    ]
+    for mode, one in figures.items():
+        lines.append((f"{mode} mode", *one.reductions.cells(), str(one.mismatches)))
+        lines.append((f"{mode} mode, Inverters counted", *one.as_emitted.cells(), ""))
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
         "  ".join(
-            cell.ljust(width) if place == 0 else cell.rjust(width)
+            cell.rjust(width) if place else cell.ljust(width)
             for place, (cell, width) in enumerate(zip(line, widths, strict=True))
         ).rstrip()
         for line in lines
     )
-
-
-def _percentages(figure: dict[str, float] | dict[str, float | dict[str, float]]) -> list[str]:
-    return [f"{figure[name]:.2f} %" for name in ("median", "maximum", "share_reduced")]
 
 
 if __name__ == "__main__":

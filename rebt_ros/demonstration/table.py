@@ -77,7 +77,8 @@ class DemonstrationTable:
 
 
 def _share_kept(count: int, fraction: float) -> int:
-    return min(max(int(count * (1 - fraction)), 1), count - 1)
+    # The tolerance keeps the rounding of, say, 100 * 0.07 from holding out one more.
+    return min(max(count - math.ceil(count * fraction - 1e-9), 1), count - 1)
 
 
 def tabulate(

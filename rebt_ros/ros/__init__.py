@@ -1,1 +1,1 @@
-"""Thin shells over the core: the three nodes.  Only this package and commands import rclpy."""
+"""Thin shells over the core: the nodes.  Only this package and commands import rclpy."""

@@ -1,0 +1,377 @@
+"""Decision trees as data decide exactly as scikit-learn's do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import strategies as some
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from sklearn.tree import DecisionTreeClassifier
+
+from rebt_ros.behavior_tree.nodes import Action
+from rebt_ros.decision_tree.encoding import Indicator, Number, columns, encode, exact_threshold
+from rebt_ros.decision_tree.training import TrainedTree, train
+from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
+from rebt_ros.demonstration.last_action import NO_ACTION
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import (
+    KNOWN,
+    HasCategory,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    Threshold,
+)
+from rebt_ros.logic.dnf import Conjunction
+
+# --- the exact threshold ----------------------------------------------------------------------
+
+SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
+LARGEST = float(np.nextafter(np.float32(1e38), np.float32(0)))
+single = st.floats(-LARGEST, LARGEST, width=32)
+#: What scikit-learn makes: single-precision numbers, and middles between two of them.
+middles = st.tuples(single, single).map(lambda pair: pair[0] / 2 + pair[1] / 2)
+doubles = st.floats(-1e38, 1e38)
+tiny = st.floats(-1e-37, 1e-37)
+
+
+def sides(threshold: float) -> list[float]:
+    """Doubles where the decision could go wrong: around each single-precision neighbour, around
+    the middles between those, around both thresholds, and around zero."""
+    exact = exact_threshold(threshold)
+    near = np.float32(threshold)
+    below, above = (np.nextafter(near, np.float32(end)) for end in (-np.inf, np.inf))
+    places = [threshold, exact, 0.0, float(below), float(near), float(above)]
+    places += [(float(below) + float(near)) / 2, (float(near) + float(above)) / 2]
+    return [
+        float(place)
+        for one in places
+        for place in (np.nextafter(one, -np.inf), one, np.nextafter(one, np.inf))
+    ]
+
+
+@settings(max_examples=300)
+@given(st.one_of(single, middles, doubles, tiny), doubles)
+@example(0.0, 0.0)
+@example(-0.0, -0.0)
+@example(SMALLEST, SMALLEST / 2)
+@example(-SMALLEST, -SMALLEST / 2)
+@example(-1e-50, -SMALLEST / 2)
+@example(1e-50, SMALLEST / 2)
+@example(1e38, 1e38)
+@example(-1e38, -1e38)
+@example(0.1, 0.1)
+@example(16777217.0, 16777217.0)
+def test_the_exact_threshold_decides_as_single_precision_does(threshold: float, x: float) -> None:
+    exact = exact_threshold(threshold)
+    for value in (x, *sides(threshold)):
+        with np.errstate(over="ignore"):
+            wanted = float(np.float32(value)) <= threshold
+        assert (value <= exact) is wanted
+
+
+@given(single)
+def test_the_exact_threshold_is_finite_and_near(threshold: float) -> None:
+    exact = exact_threshold(threshold)
+    assert type(exact) is float
+    assert math.isfinite(exact)
+    spacing = abs(float(np.spacing(np.float32(threshold))))
+    assert threshold <= exact <= threshold + spacing
+
+
+@given(single, single)
+def test_exact_thresholds_keep_the_order(one: float, other: float) -> None:
+    if one < other:
+        assert exact_threshold(one) < exact_threshold(other)
+
+
+# --- encoding ---------------------------------------------------------------------------------
+
+
+def test_columns_and_their_values() -> None:
+    table = some.table(
+        [(0.25, math.nan, 1, 2), (math.nan, 1e38, math.nan, math.nan), (0.1, -1e38, 0, 0)],
+        [0, 2, 2],
+    )
+    asked = columns(table, last_action=True)
+    assert asked == (
+        Number("distance"),
+        Number("battery"),
+        Indicator(IsTrue("docked")),
+        *(Indicator(HasCategory("kind", one)) for one in ("box", "cup", "tool")),
+        *(Indicator(LastActionIs(one)) for one in some.LABELS),
+    )
+    missing = np.finfo(np.float32).max
+    assert np.array_equal(
+        encode(table, last_action=True),
+        np.array(
+            [
+                [0.25, missing, 1, 0, 0, 1, 0, 0, 0, 0],
+                [missing, np.float32(1e38), 0, 0, 0, 0, 1, 0, 0, 0],
+                [np.float32(0.1), np.float32(-1e38), 0, 1, 0, 0, 1, 0, 0, 0],
+            ],
+            dtype=np.float32,
+        ),
+    )
+    assert columns(table, last_action=False) == asked[:6]
+    assert (encode(table, last_action=False) == encode(table, last_action=True)[:, :6]).all()
+
+
+@settings(max_examples=60)
+@given(some.tables(), st.booleans())
+def test_an_indicator_is_1_exactly_where_its_condition_holds(
+    table: DemonstrationTable, last_action: bool
+) -> None:
+    matrix = encode(table, last_action)
+    assert matrix.dtype == np.float32
+    assert np.isfinite(matrix).all()
+    asked = columns(table, last_action)
+    assert matrix.shape == (len(table), len(asked))
+    for place, column in enumerate(asked):
+        if isinstance(column, Indicator):
+            at_most_half = column.at_most(0.5)
+            for row, value in enumerate(matrix[:, place]):
+                wanted = holds(at_most_half, table, row)
+                assert (value <= 0.5) is np.True_ if wanted else value == 1
+
+
+def test_a_split_behind_all_known_values_asks_whether_the_value_is_known() -> None:
+    assert Number("x").at_most(2.2e38) == Literal(Threshold("x", KNOWN))
+    assert Number("x").at_most(1e38) == Literal(Threshold("x", exact_threshold(1e38)))
+
+
+# --- training ---------------------------------------------------------------------------------
+
+
+def holds(literal: Literal, table: DemonstrationTable, row: int) -> bool:
+    code = int(table.last[row])
+    last = None if code == NO_ACTION else table.actions[code]
+    return some.holds(literal, table.states[row].tolist(), last)
+
+
+def walk(tree: DecisionTree, table: DemonstrationTable, row: int) -> Leaf:
+    node: DecisionNode = tree.root
+    while isinstance(node, Split):
+        satisfied = holds(Literal(node.condition), table, row)
+        node = node.if_true if satisfied else node.if_false
+    return node
+
+
+def walked(tree: DecisionTree, table: DemonstrationTable) -> list[int]:
+    return [walk(tree, table, row).most_probable for row in range(len(table))]
+
+
+depths = st.sampled_from((None, 1, 2, 4))
+
+
+@settings(max_examples=80)
+@given(some.tables(max_rows=30), some.tables(max_rows=30), st.booleans(), depths)
+def test_the_data_decides_as_scikit_learn_predicts_on_seen_and_unseen_rows(
+    table: DemonstrationTable,
+    unseen: DemonstrationTable,
+    last_action: bool,
+    max_depth: int | None,
+) -> None:
+    trained = train(table, last_action=last_action, max_depth=max_depth)
+    assert trained.uses_last_action is last_action
+    for rows in (table, unseen):
+        assert walked(trained.tree, rows) == trained.predict(rows).tolist()
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(doubles | some.numbers, st.integers(0, 3)), min_size=2, max_size=25))
+def test_numbers_of_every_size_are_split_as_scikit_learn_splits_them(
+    rows: list[tuple[float, int]],
+) -> None:
+    table = some.table(
+        [(value, math.nan, 0, 0) for value, _ in rows], [action for _, action in rows]
+    )
+    trained = train(table, last_action=False)
+    assert walked(trained.tree, table) == trained.predict(table).tolist()
+    beside = [
+        (float(place), math.nan, 0.0, 0.0)
+        for value in _thresholds(trained)
+        if value < 1e38
+        for place in (np.nextafter(value, -np.inf), value, np.nextafter(value, np.inf))
+    ]
+    if beside:
+        probes = some.table(beside, [0] * len(beside))
+        assert walked(trained.tree, probes) == trained.predict(probes).tolist()
+
+
+@settings(max_examples=50)
+@given(some.tables(max_rows=30), some.tables(max_rows=30), st.data())
+def test_a_pruned_tree_predicts_as_scikit_learns_own_pruned_tree(
+    table: DemonstrationTable, unseen: DemonstrationTable, data: st.DataObject
+) -> None:
+    matrix = encode(table, last_action=True)
+    path = DecisionTreeClassifier(random_state=0).cost_complexity_pruning_path(matrix, table.chosen)
+    steps = [0.0, *path.ccp_alphas.tolist(), 1.0]
+    # On a step itself the last bit decides; between two steps the tree is well defined.
+    below, above = data.draw(st.sampled_from([*pairwise(steps)]))
+    ccp_alpha = (below + above) / 2
+    trained = train(table, last_action=True, ccp_alpha=ccp_alpha)
+    reference = DecisionTreeClassifier(random_state=0, ccp_alpha=ccp_alpha)
+    reference.fit(matrix, table.chosen)
+    for rows in (table, unseen):
+        wanted = reference.predict(encode(rows, last_action=True)).tolist()
+        assert trained.predict(rows).tolist() == wanted
+        assert walked(trained.tree, rows) == wanted
+
+
+def _thresholds(trained: TrainedTree) -> list[float]:
+    return sorted(
+        {
+            literal.condition.value
+            for conjunction, _ in trained.tree.paths()
+            for literal in conjunction
+            if isinstance(literal.condition, Threshold)
+        }
+    )
+
+
+@settings(max_examples=60)
+@given(some.tables(max_rows=30), st.booleans(), depths)
+def test_leaves_count_the_training_rows_that_reach_them(
+    table: DemonstrationTable, last_action: bool, max_depth: int | None
+) -> None:
+    trained = train(table, last_action=last_action, max_depth=max_depth)
+    reached: dict[int, list[int]] = {}
+    leaves: dict[int, Leaf] = {}
+    for row, action in enumerate(table.chosen.tolist()):
+        leaf = walk(trained.tree, table, row)
+        leaves[id(leaf)] = leaf
+        reached.setdefault(id(leaf), [0] * len(some.LABELS))[action] += 1
+    for key, leaf in leaves.items():
+        assert list(leaf.distribution) == reached[key]
+    assert sum(sum(leaf.distribution) for _, leaf in trained.tree.paths()) == len(table)
+
+
+@settings(max_examples=40)
+@given(some.tables(max_rows=30), some.tables(max_rows=30))
+def test_every_state_takes_exactly_one_path(
+    table: DemonstrationTable, unseen: DemonstrationTable
+) -> None:
+    tree = train(table, last_action=True).tree
+    paths = list(tree.paths())
+    for row in range(len(unseen)):
+        taken = [
+            leaf
+            for conjunction, leaf in paths
+            if all(holds(literal, unseen, row) for literal in conjunction)
+        ]
+        assert taken == [walk(tree, unseen, row)]
+
+
+@settings(max_examples=30)
+@given(some.tables(max_rows=30), st.integers(0, 3))
+def test_training_again_gives_the_same_tree(table: DemonstrationTable, seed: int) -> None:
+    trained = train(table, last_action=True, random_state=seed)
+    train(table, last_action=False, random_state=seed + 1)
+    assert train(table, last_action=True, random_state=seed).tree == trained.tree
+
+
+def test_a_single_action_gives_a_single_leaf() -> None:
+    table = some.table([(0.1, 0, 0, 0), (0.9, 0, 0, 0)], [2, 2])
+    trained = train(table, last_action=True)
+    assert trained.tree.root == Leaf((0, 0, 2, 0))
+    assert trained.tree.root.most_probable == 2
+    assert trained.predict(table).tolist() == [2, 2]
+    assert list(trained.tree.paths()) == [(Conjunction(), trained.tree.root)]
+
+
+@pytest.mark.parametrize("last_action", [False, True])
+def test_a_table_without_features_gives_a_tree_all_the_same(last_action: bool) -> None:
+    table = some.table([(), (), ()], [1, 3, 3], features=())
+    trained = train(table, last_action=last_action)
+    assert walked(trained.tree, table) == trained.predict(table).tolist()
+    if not last_action:
+        assert trained.tree.root == Leaf((0, 1, 0, 2))
+
+
+def test_a_tie_goes_to_the_first_action_as_in_scikit_learn() -> None:
+    # Rows that cannot be told apart, in an order that puts the later actions first.
+    table = some.table([(0.5, 0, 0, 0)] * 7, [3, 3, 1, 2, 1, 2, 0])
+    trained = train(table, last_action=False)
+    assert trained.tree.root == Leaf((1, 2, 2, 2))
+    assert walked(trained.tree, table) == trained.predict(table).tolist() == [1] * 7
+
+
+@settings(max_examples=30)
+@given(st.lists(st.integers(0, 400), min_size=4, max_size=4).filter(any))
+def test_counts_are_whole_also_in_large_leaves(counts: list[int]) -> None:
+    chosen = [action for action, rows in enumerate(counts) for _ in range(rows)]
+    table = some.table([(0.0,) * 4] * len(chosen), chosen)
+    trained = train(table, last_action=False)
+    assert trained.tree.root == Leaf(tuple(counts))
+    assert set(trained.predict(table).tolist()) == {trained.tree.root.most_probable}
+
+
+def test_actions_of_the_tree_are_on_the_tables_channel() -> None:
+    table = some.table([(0.1, 0, 0, 0)], [0])
+    assert train(table, last_action=False).tree.actions == tuple(
+        Action(label, some.CHANNEL) for label in some.LABELS
+    )
+
+
+def test_max_depth_and_ccp_alpha_make_smaller_trees() -> None:
+    values = [float(n) for n in range(16)]
+    table = some.table([(value, 0, 0, 0) for value in values], [n % 4 for n in range(16)])
+
+    def leaves(max_depth: int | None = None, ccp_alpha: float = 0.0) -> int:
+        trained = train(table, last_action=False, max_depth=max_depth, ccp_alpha=ccp_alpha)
+        return sum(1 for _ in trained.tree.paths())
+
+    assert leaves() == 16
+    assert leaves(max_depth=2) <= 4
+    assert leaves(ccp_alpha=1.0) == 1
+
+
+def test_missing_numbers_are_told_from_all_known_ones() -> None:
+    # Only a missing value calls for the other action.
+    values: Sequence[float] = (-1e38, 0.0, 1e38, math.nan, math.nan)
+    table = some.table([(value, 0, 0, 0) for value in values], [0, 0, 0, 1, 1])
+    trained = train(table, last_action=False)
+    assert trained.tree.root == Split(
+        Threshold("distance", KNOWN), Leaf((3, 0, 0, 0)), Leaf((0, 2, 0, 0))
+    )
+
+
+# --- paths ------------------------------------------------------------------------------------
+
+
+def test_paths_come_from_left_to_right_and_hold_each_condition_once() -> None:
+    low, high = Threshold("distance", 0.1), Threshold("distance", 0.5)
+    one, two, three = Leaf((1, 0)), Leaf((0, 1)), Leaf((1, 1))
+    actions = (Action("go", "m"), Action("turn", "m"))
+    tree = DecisionTree(actions, Split(high, Split(low, one, two), three))
+    assert list(tree.paths()) == [
+        (some.conjunction(Literal(high), Literal(low)), one),
+        (some.conjunction(Literal(high), ~Literal(low)), two),
+        (some.conjunction(~Literal(high)), three),
+    ]
+
+
+def test_a_condition_that_is_tested_again_stands_once_and_contradictions_are_left_out() -> None:
+    again = Threshold("distance", 0.5)
+    one, two, three, four = (Leaf((n,)) for n in range(1, 5))
+    tree = DecisionTree(
+        (Action("go", "m"),), Split(again, Split(again, one, two), Split(again, three, four))
+    )
+    assert list(tree.paths()) == [
+        (some.conjunction(Literal(again)), one),
+        (some.conjunction(~Literal(again)), four),
+    ]
+
+
+def test_features_may_be_of_one_kind_only() -> None:
+    binary = (Feature("docked", FeatureKind.BINARY),)
+    table = some.table([(0,), (1,), (math.nan,)], [0, 1, 0], features=binary)
+    trained = train(table, last_action=False)
+    assert trained.tree.root == Split(IsTrue("docked"), Leaf((0, 1, 0, 0)), Leaf((2, 0, 0, 0)))

@@ -1,0 +1,455 @@
+"""The behavior tree document: what goes out comes back, and what is not one is refused."""
+
+from __future__ import annotations
+
+import copy
+import json
+import struct
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+import strategies as some
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.document import (
+    DEEPEST_TREE,
+    LARGEST_DOCUMENT,
+    dumps,
+    json_schema,
+    loads,
+)
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, SuggestionKind
+from rebt_ros.errors import DocumentError
+from rebt_ros.logic.conditions import HasCategory, IsTrue, LastActionIs, Literal, Threshold
+
+SCHEMA = Draft202012Validator(json_schema())
+
+NEAR = Literal(Threshold("distance", 0.1 + 0.2))
+EVERY_NODE = nodes.Parallel(
+    (
+        some.when(NEAR, then=some.action("turn")),
+        nodes.Selector((nodes.Inverter(nodes.Condition(Literal(IsTrue("docked")))),), memory=True),
+        nodes.Sequence((nodes.Condition(~Literal(HasCategory("kind", "cup"))),), memory=True),
+        nodes.ParallelSelector((some.action("go"), some.action("wait"))),
+        nodes.Repeater(
+            (
+                nodes.Condition(Literal(LastActionIs("go", ("turn", "wait")))),
+                some.action("turn"),
+            )
+        ),
+    )
+)
+FULL = LearnedTree(
+    some.FEATURES,
+    some.ACTIONS,
+    EVERY_NODE,
+    some.PROVENANCE,
+    (Suggestion("psa-1", SuggestionKind.PSA, 3, EVERY_NODE.children[3], attached=True),),
+)
+
+
+def document() -> dict[str, Any]:
+    """A valid document that has everything once."""
+    decoded: dict[str, Any] = json.loads(dumps(FULL))
+    return decoded
+
+
+def refusal(text: str) -> str:
+    """Why a text is refused; that it is refused otherwise fails the test."""
+    with pytest.raises(DocumentError) as refused:
+        loads(text)
+    message = str(refused.value)
+    assert message.endswith(".")
+    assert "\n" not in message
+    # For a log line or a service response, whatever was sent.
+    assert len(message) < 500
+    message.encode()
+    return message
+
+
+def reason_against(text: str) -> str | None:
+    try:
+        loads(text)
+    except DocumentError as refused:
+        return str(refused)
+    return None
+
+
+# --- there and back ---------------------------------------------------------------------------
+
+
+@settings(max_examples=40)
+@given(some.learned_trees())
+@example(FULL)
+def test_what_is_dumped_is_loaded_again(learned: LearnedTree) -> None:
+    text = dumps(learned)
+    text.encode()
+    assert loads(text) == learned
+    assert dumps(loads(text)) == text
+    assert SCHEMA.is_valid(json.loads(text))
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+@example(-0.0)
+@example(5e-324)
+@example(1.7976931348623157e308)
+@example(0.1 + 0.2)
+def test_thresholds_keep_every_bit(value: float) -> None:
+    tree = nodes.Condition(Literal(Threshold("distance", value)))
+    loaded = loads(dumps(some.learned(tree))).tree
+    assert isinstance(loaded, nodes.Condition)
+    assert isinstance(loaded.literal.condition, Threshold)
+    assert struct.pack("d", loaded.literal.condition.value) == struct.pack("d", value)
+
+
+def test_the_schema_is_one() -> None:
+    Draft202012Validator.check_schema(json_schema())
+
+
+def test_numbers_may_be_written_with_or_without_a_fraction() -> None:
+    changed = document()
+    changed["version"] = 1.0
+    changed["provenance"]["rows"] = 7.0
+    changed["provenance"]["delta"] = 1
+    changed["tree"]["children"][0]["children"][0]["test"]["at_most"] = 3
+    assert SCHEMA.is_valid(changed)
+    loaded = loads(json.dumps(changed))
+    assert loaded.provenance.rows == 7
+    assert type(loaded.provenance.rows) is int
+    assert type(loaded.provenance.delta) is float
+
+
+# --- the schema and the reader agree ----------------------------------------------------------
+
+#: What the schema cannot say.
+EXTRA_RULES = (
+    "is not declared",
+    "has no category",
+    "two features have the same name",
+    "more than 100 levels",
+    "whole characters",
+    "finite number",
+)
+
+
+def places(value: object) -> Iterator[tuple[Any, Any]]:
+    """Every container of the document with each of its keys."""
+    if isinstance(value, dict | list):
+        for key in list(value) if isinstance(value, dict) else range(len(value)):
+            yield value, key
+            yield from places(value[key])
+
+
+scalars = st.sampled_from(
+    (None, True, False, 0, 1, -1, 1.0, 0.5, 1.5, -0.5, 10**400, "", "x", "condition", "psa")
+)
+json_values = st.recursive(
+    scalars | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=3),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3)
+    ),
+    max_leaves=4,
+)
+
+
+@st.composite
+def mutated(draw: st.DrawFn) -> Any:
+    changed = document()
+    for _ in range(draw(st.integers(1, 2))):
+        every = list(places(changed))
+        if not every:
+            break
+        container, key = draw(st.sampled_from(every))
+        how = draw(st.sampled_from(("delete", "replace", "swap", "rename", "add", "wrap")))
+        other_container, other_key = draw(st.sampled_from(every))
+        if how == "delete":
+            del container[key]
+        elif how == "replace":
+            container[key] = draw(json_values)
+        elif how == "swap":
+            container[key] = copy.deepcopy(other_container[other_key])
+        elif how == "wrap":
+            container[key] = draw(
+                st.sampled_from(([container[key]], {"child": container[key]}, [], {}))
+            )
+        elif isinstance(container, dict):
+            name = other_key if isinstance(other_key, str) else draw(st.text(max_size=3))
+            container[name] = container.pop(key) if how == "rename" else draw(json_values)
+        else:
+            container.append(copy.deepcopy(container[key]))
+    return changed
+
+
+@settings(max_examples=150)
+@given(mutated())
+def test_the_reader_accepts_what_the_schema_accepts(changed: Any) -> None:
+    text = json.dumps(changed)
+    reason = reason_against(text)
+    if SCHEMA.is_valid(changed):
+        assert reason is None or any(rule in reason for rule in EXTRA_RULES), reason
+    else:
+        assert reason is not None
+
+
+def test_no_field_can_be_left_out_unless_it_has_a_default() -> None:
+    count = len(list(places(document())))
+    for number in range(count):
+        changed = document()
+        container, key = list(places(changed))[number]
+        if isinstance(container, dict) and key != "memory":
+            del container[key]
+            assert not SCHEMA.is_valid(changed)
+            refusal(json.dumps(changed))
+
+
+@pytest.mark.parametrize("name", ["tree", "features", "actions", "suggestions", "provenance"])
+@pytest.mark.parametrize("value", [None, True, 0, 1.5, "x", [[]], {"type": "x"}, [None]])
+def test_no_part_can_be_of_another_type(name: str, value: object) -> None:
+    changed = document()
+    changed[name] = value
+    assert not SCHEMA.is_valid(changed)
+    assert f"document.{name}" in refusal(json.dumps(changed))
+
+
+# --- messages name the place ------------------------------------------------------------------
+
+Change = Callable[[dict[str, Any]], object]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d: d.pop("tree"), "document lacks 'tree'."),
+        (lambda d: d.update(extra=1), "document has the unknown field 'extra'."),
+        (lambda d: d.pop("format"), "does not say that its format is 'rebt_ros/behavior_tree'"),
+        (lambda d: d.update(format="bt"), "does not say that its format is"),
+        (lambda d: d.update(version=2), "version 2: this release of rebt_ros reads version 1"),
+        (lambda d: d.update(version=True), "version True"),
+        (lambda d: d.update(version="1"), "version '1'"),
+        (lambda d: d.pop("version"), "version None"),
+        (lambda d: d.update(actions=[]), "document.actions must be an array of at least 1"),
+        (
+            lambda d: d["features"][2].update(kind="text"),
+            "document.features[2].kind must be one of numeric, binary, categorical, not 'text'.",
+        ),
+        (lambda d: d["features"][0].update(categories=["a"]), "contradicts itself"),
+        (lambda d: d["features"][3].pop("categories"), "contradicts itself"),
+        (lambda d: d["features"][0].update(topic="state"), "contradicts itself"),
+        (
+            lambda d: d["features"].append(dict(d["features"][0])),
+            "two features have the same name",
+        ),
+        (
+            lambda d: d["tree"].update(type="cycle"),
+            "document.tree has the unknown type 'cycle'.",
+        ),
+        (
+            lambda d: d["tree"]["children"][0]["children"][1].pop("label"),
+            "document.tree.children[0].children[1] lacks 'label'.",
+        ),
+        (
+            lambda d: d["tree"]["children"][0]["children"][0]["test"].update(at_most="near"),
+            "document.tree.children[0].children[0].test.at_most must be a number, not 'near'.",
+        ),
+        (
+            lambda d: d["tree"]["children"][0]["children"][0]["test"].update(at_most=10**400),
+            "document.tree.children[0].children[0].test.at_most must be a finite number",
+        ),
+        (
+            lambda d: d["tree"]["children"][0]["children"][0]["test"].update(feature="speed"),
+            "feature 'speed' is not declared",
+        ),
+        (
+            lambda d: d["tree"]["children"][2]["children"][0]["test"].update(category="plate"),
+            "feature 'kind' has no category 'plate'",
+        ),
+        (
+            lambda d: d["tree"]["children"][3]["children"][0].update(label="fly"),
+            "action 'fly' on 'action' is not declared",
+        ),
+        (
+            lambda d: d["tree"]["children"][4]["children"][0]["test"].update(action="fly"),
+            "last action 'fly' is not declared",
+        ),
+        (
+            lambda d: d["tree"]["children"][4]["children"][0]["test"]["deciding"].append("fly"),
+            "last action 'fly' is not declared",
+        ),
+        (
+            lambda d: d["suggestions"][0]["tree"]["children"][0].update(channel="arm"),
+            "action 'go' on 'arm' is not declared",
+        ),
+        (
+            lambda d: d["tree"]["children"][1]["children"].clear(),
+            "document.tree.children[1].children must be an array of at least 1 elements, not [].",
+        ),
+        (
+            lambda d: d["tree"].update(memory=True),
+            "document.tree has the unknown field 'memory'.",
+        ),
+        (
+            lambda d: d["suggestions"][0].update(support=-1),
+            "document.suggestions[0].support must be a whole number of at least 0, not -1.",
+        ),
+        (
+            lambda d: d["provenance"].update(delta=1.5),
+            "document.provenance.delta must be a number from 0 to 1, not 1.5.",
+        ),
+        (
+            lambda d: d["provenance"]["figures"].update(own_history_agreement="all"),
+            "document.provenance.figures.own_history_agreement must be a number, not 'all'.",
+        ),
+        (lambda d: d["actions"][0].update(label="\ud800"), "a text of whole characters"),
+    ],
+)
+def test_a_refusal_names_the_place(change: Change, message: str) -> None:
+    changed = document()
+    change(changed)
+    assert message in refusal(json.dumps(changed))
+
+
+# --- hostile input ----------------------------------------------------------------------------
+
+
+@settings(max_examples=100)
+@given(st.text() | st.text(alphabet='{}[]",:0123456789.eE+-truefalsn\\u \n'))
+@example("")
+@example("null")
+@example("[]")
+@example("\ufeff{}")
+@example("\ud800")
+def test_any_text_is_refused(text: str) -> None:
+    refusal(text)
+
+
+@settings(max_examples=60)
+@given(json_values)
+def test_any_other_json_is_refused(value: object) -> None:
+    refusal(json.dumps(value))
+
+
+def test_a_document_that_was_cut_off_is_refused_wherever_it_was_cut() -> None:
+    text = dumps(FULL)
+    for end in range(0, len(text), 7):
+        refusal(text[:end])
+    refusal(text[:-1])
+
+
+@settings(max_examples=100)
+@given(st.integers(0, 10**6), st.characters())
+def test_a_changed_character_is_refused_or_read(place: int, character: str) -> None:
+    text = dumps(FULL)
+    place %= len(text)
+    reason = reason_against(text[:place] + character + text[place + 1 :])
+    assert reason is None or reason.endswith(".")
+
+
+def with_value(name: str, value: str) -> str:
+    """The document with JSON text as the value of one of its fields."""
+    changed = document()
+    changed[name] = "@@"
+    return json.dumps(changed).replace('"@@"', value)
+
+
+FIELDS = ("format", "version", "features", "actions", "tree", "suggestions", "provenance")
+
+
+@pytest.mark.parametrize("name", FIELDS)
+@pytest.mark.parametrize(
+    "value",
+    [
+        "[" * 100_000,
+        "[" * 100_000 + "]" * 100_000,
+        '{"a":' * 100_000 + "1" + "}" * 100_000,
+        "9" * 4000,
+        "9" * 5000,
+        "-" + "9" * 5000,
+        "1e999",
+        "-1e999",
+        "NaN",
+        "Infinity",
+        "-Infinity",
+        '"\\ud800"',
+        '"' + "x" * 100_000 + '"',
+        "[" + "1," * 10_000 + "1]",
+        '{"type": "' + "x" * 10_000 + '"}',
+    ],
+    ids=[
+        "open brackets",
+        "brackets",
+        "braces",
+        "4000 digits",
+        "5000 digits",
+        "-5000 digits",
+        "1e999",
+        "-1e999",
+        "NaN",
+        "Infinity",
+        "-Infinity",
+        "lone surrogate",
+        "long text",
+        "long array",
+        "long type",
+    ],
+)
+def test_a_hostile_value_is_refused_in_every_field(name: str, value: str) -> None:
+    refusal(with_value(name, value))
+
+
+@pytest.mark.parametrize("value", ["1e999", "NaN", "9" * 5000, "Infinity", '"0.3"', "[0.3]"])
+def test_a_threshold_is_a_finite_number(value: str) -> None:
+    assert isinstance(NEAR.condition, Threshold)
+    refusal(dumps(FULL).replace(repr(NEAR.condition.value), value))
+
+
+@pytest.mark.parametrize("name", ["version", "features", "tree", "provenance"])
+def test_nesting_is_refused_also_at_the_edge_of_what_can_be_read(name: str) -> None:
+    for depth in (*range(850, 1010), 3000, 10_000, 30_000):
+        refusal(with_value(name, "[" * depth + "]" * depth))
+
+
+def test_a_field_that_is_there_twice_does_no_harm() -> None:
+    text = dumps(FULL)
+    assert loads('{"version": 7,' + text[1:]) == FULL
+    refusal(text[:-1] + ', "version": 7}')
+
+
+def nested(levels: int) -> LearnedTree:
+    tree: nodes.Node = some.action("go")
+    for _ in range(levels - 1):
+        tree = nodes.Inverter(tree)
+    return some.learned(tree)
+
+
+def test_a_tree_may_have_100_levels_and_not_one_more() -> None:
+    assert DEEPEST_TREE == 100
+    assert nodes.depth(loads(dumps(nested(100))).tree) == 100
+    assert "more than 100 levels" in refusal(dumps(nested(101)))
+
+
+def test_a_document_may_be_large_and_not_larger() -> None:
+    text = dumps(FULL)
+    assert loads(text + " " * (LARGEST_DOCUMENT - len(text))) == FULL
+    message = refusal(text + " " * (LARGEST_DOCUMENT - len(text) + 1))
+    assert f"{LARGEST_DOCUMENT + 1} characters" in message
+
+
+def test_a_document_with_very_many_actions_is_read_in_reasonable_time() -> None:
+    actions = tuple(some.action(str(number)) for number in range(20_000))
+    features = tuple(some.FEATURES[:1])
+    learned = LearnedTree(features, actions, nodes.Selector(actions), some.PROVENANCE)
+    assert loads(dumps(learned)) == learned
+
+
+@pytest.mark.parametrize(
+    "names",
+    [(), ("x", "x"), ("x",)],
+)
+def test_a_learned_tree_declares_what_it_tests(names: tuple[str, ...]) -> None:
+    features = tuple(some.FEATURES[0].__class__(name) for name in names)
+    with pytest.raises(ValueError):
+        some.learned(nodes.Condition(NEAR), features)

@@ -1,0 +1,154 @@
+"""Agreement with a demonstration, LAT being the demonstrator's or the tree's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import strategies as some
+from hypothesis import given, settings
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.evaluation import (
+    actions_of,
+    agreement,
+    own_history_choices,
+    teacher_forced_choices,
+)
+from rebt_ros.logic.conditions import LastActionIs, Literal
+
+GO, GRASP, TURN, WAIT = some.ACTIONS
+
+
+def ticked_with_own_history(tree: nodes.Node, table: DemonstrationTable) -> list[int]:
+    """A runtime that lives through each demonstration and knows of nothing but its own choices."""
+    chosen = []
+    runtime = TreeRuntime(some.learned(tree))
+    for row, state in enumerate(table.states.tolist()):
+        if row == 0 or table.demonstration[row] != table.demonstration[row - 1]:
+            runtime.histories[some.CHANNEL].clear()
+        actions = runtime.tick(state).actions
+        assert len(actions) <= 1
+        chosen.append(table.actions.index(actions[0].label) if actions else NO_ACTION)
+    return chosen
+
+
+class OneLastAction(ActionHistory):
+    """LAT as a column has it: the same, whatever is decided."""
+
+    last: str | None = None
+
+    def before(self, *deciding: str) -> str | None:
+        return self.last
+
+
+def ticked_with_the_column(tree: nodes.Node, table: DemonstrationTable) -> list[int]:
+    chosen = []
+    history = OneLastAction()
+    runtime = TreeRuntime(some.learned(tree), histories={some.CHANNEL: history})
+    for state, last in zip(table.states.tolist(), table.last.tolist(), strict=True):
+        history.last = None if last == NO_ACTION else table.actions[last]
+        actions = runtime.tick(state).actions
+        chosen.append(table.actions.index(actions[0].label) if actions else NO_ACTION)
+    return chosen
+
+
+@settings(max_examples=150)
+@given(some.rule_trees(), some.tables(max_rows=25))
+def test_own_history_choices_are_those_of_a_runtime_that_lives_through_the_rows(
+    tree: nodes.Node, table: DemonstrationTable
+) -> None:
+    assert own_history_choices(tree, table).tolist() == ticked_with_own_history(tree, table)
+
+
+@settings(max_examples=80)
+@given(some.rule_trees(), some.tables(max_rows=25))
+def test_teacher_forced_choices_are_those_of_a_runtime_that_is_told_the_column(
+    tree: nodes.Node, table: DemonstrationTable
+) -> None:
+    assert teacher_forced_choices(tree, table).tolist() == ticked_with_the_column(tree, table)
+
+
+@settings(max_examples=80)
+@given(some.rule_trees(), some.tables(max_rows=25))
+def test_without_lat_conditions_both_are_the_same(
+    tree: nodes.Node, table: DemonstrationTable
+) -> None:
+    if not any(isinstance(one.literal.condition, LastActionIs) for one in nodes.conditions(tree)):
+        assert (own_history_choices(tree, table) == teacher_forced_choices(tree, table)).all()
+
+
+def last(action: str, *deciding: str) -> Literal:
+    return Literal(LastActionIs(action, deciding))
+
+
+#: Turns after going, and goes otherwise.
+COPYCAT = nodes.Selector((some.when(last("go", "turn"), then=TURN), GO))
+
+
+def rows_of(chosen: list[int], demonstration: list[int] | None = None) -> DemonstrationTable:
+    return some.table([(0.0,) * 4] * len(chosen), chosen, demonstration)
+
+
+@pytest.mark.parametrize(
+    ("demonstration", "own", "forced"),
+    [
+        # Shown: go, go, turn, go; LAT by the column: none, none, go, turn.
+        ([0, 0, 0, 0], [0, 2, 2, 2], [0, 0, 2, 0]),
+        # Each demonstration starts without a history.  LAT: none, none | none, turn.
+        ([0, 0, 1, 1], [0, 2, 0, 2], [0, 0, 0, 0]),
+    ],
+)
+def test_the_copycat_problem(demonstration: list[int], own: list[int], forced: list[int]) -> None:
+    table = rows_of([0, 0, 2, 0], demonstration)
+    assert own_history_choices(COPYCAT, table).tolist() == own
+    assert teacher_forced_choices(COPYCAT, table).tolist() == forced
+
+
+def test_a_row_without_a_choice_leaves_the_history_as_it_was() -> None:
+    near = some.at_most("distance", 0.3)
+    # Turns after going; far away it does nothing at all.
+    tree = nodes.Selector(
+        (some.when(near, last("go", "turn"), then=TURN), some.when(near, then=GO))
+    )
+    states = [(0.1, 0, 0, 0), (0.9, 0, 0, 0), (0.9, 0, 0, 0), (0.1, 0, 0, 0)]
+    table = some.table(states, [0, 0, 0, 0])
+    assert own_history_choices(tree, table).tolist() == [0, NO_ACTION, NO_ACTION, 2]
+
+
+def test_lat_of_a_group_reaches_back_beyond_the_group() -> None:
+    # Waits once, and from then on goes and turns by turns: LAT of the pair stays "wait".
+    pair = last("wait", "go", "turn")
+    tree = nodes.Selector(
+        (
+            some.when(pair, last("go", "turn"), ~last("turn", "go"), then=TURN),
+            some.when(pair, then=GO),
+            WAIT,
+        )
+    )
+    table = rows_of([0] * 6)
+    own = own_history_choices(tree, table).tolist()
+    assert own == ticked_with_own_history(tree, table)
+    assert own == [3, 0, 2, 0, 0, 0]
+
+
+def test_agreement_is_the_share_of_equal_rows() -> None:
+    table = rows_of([0, 1, 2, 3])
+    assert agreement(table.chosen, table) == 1.0
+    assert agreement(np.array([0, 1, 0, NO_ACTION]), table) == 0.5
+    assert agreement(np.array([NO_ACTION] * 4), table) == 0.0
+    nothing = table.where(np.zeros(4, dtype=bool))
+    assert agreement(nothing.chosen, nothing) is None
+
+
+def test_the_actions_of_a_table_are_on_its_channel_in_the_order_of_its_codes() -> None:
+    assert actions_of(rows_of([0])) == some.ACTIONS
+
+
+def test_no_rows_give_no_choices() -> None:
+    nothing = rows_of([])
+    for tree in (GO, COPYCAT):
+        assert own_history_choices(tree, nothing).tolist() == []
+        assert teacher_forced_choices(tree, nothing).tolist() == []

@@ -1,0 +1,341 @@
+"""The executor, as a process, over real DDS."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from ros_processes import LATCHED, NodeProcess, Peer, own_domain, values_of
+from std_msgs.msg import String
+
+from rebt_ros.behavior_tree.document import dumps
+from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
+from rebt_ros.behavior_tree.nodes import Action, Condition, Node, Selector, Sequence, actions
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.logic.conditions import LastActionIs, Literal, Threshold
+from rebt_ros.storage.tree_file import write_tree
+
+GO, TURN, STOP = (Action(label, "action") for label in ("go", "turn", "stop"))
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    with own_domain() as number:
+        yield number
+
+
+@pytest.fixture
+def peer(domain: int) -> Iterator[Peer]:
+    with Peer(domain) as one:
+        yield one
+
+
+def _learned(tree: Node, topic: str | None = "state") -> LearnedTree:
+    """Features y and x; y, the first value of the state, is never tested."""
+    return LearnedTree(
+        tuple(
+            Feature(name, topic=topic, index=None if topic is None else index)
+            for index, name in enumerate(("y", "x"))
+        ),
+        actions(tree),
+        tree,
+        Provenance(1, 10, 0.0, 5, 0.0, Root.SELECTOR, False, Figures(0, 1.0, 1.0, 2)),
+    )
+
+
+def _where_x_is_small(small: Action, otherwise: Action) -> Node:
+    return Selector((Sequence((Condition(Literal(Threshold("x", 0.5))), small)), otherwise))
+
+
+def _status(peer: Peer, condition: str, **values: str) -> Any:
+    """Waits until the executor reports a condition."""
+
+    def reported() -> Any:
+        status = peer.diagnostics.get("executor: execution")
+        if status is None or values_of(status)["condition"] != condition:
+            return None
+        found = values_of(status)
+        keys = {key.replace("_", " "): value for key, value in values.items()}
+        return status if all(found.get(key) == value for key, value in keys.items()) else None
+
+    return peer.wait_until(reported, what=f"the condition {condition!r}")
+
+
+class Robot:
+    """Publishes a state all the time and hears the commands."""
+
+    def __init__(self, peer: Peer) -> None:
+        self._peer = peer
+        self.state = (7.0, 0.0)
+        self.commands = peer.listen(String, "command")
+
+    def until(self, condition: Any, what: str = "") -> Any:
+        def published() -> Any:
+            self._peer.state(*self.state)
+            return condition()
+
+        return self._peer.wait_until(published, what=what)
+
+    def obeys(self, label: str) -> None:
+        """Waits for a command that is sent from now on."""
+        seen = len(self.commands)
+        self.until(
+            lambda: any(one.data == label for one in self.commands[seen:]), f"command {label!r}"
+        )
+
+
+def _publish(peer: Peer, learned: LearnedTree | str) -> None:
+    document = learned if isinstance(learned, str) else dumps(learned)
+    peer.connect(String, "behavior_tree", LATCHED).publish(String(data=document))
+
+
+def test_it_waits_for_a_tree_then_to_be_enabled_then_for_state(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("executor_node", domain, tmp_path) as executor:
+        robot_hears = peer.listen(String, "command")
+        _status(peer, "waiting for a tree", enabled="False")
+        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        status = _status(peer, "disabled")
+        assert values_of(status)["nodes"] == "5"
+        answer = peer.call("/executor/enable", True)
+        assert answer.success
+        assert "waiting for state: state (never received)" in answer.message
+        status = _status(peer, "waiting for state")
+        assert int.from_bytes(status.level, "big") == 1
+        assert robot_hears == []
+        robot = Robot(peer)
+        robot.obeys("go")
+        robot.state = (7.0, 1.0)
+        robot.obeys("turn")
+        assert executor.stop() == 0
+        assert "Traceback" not in executor.stderr
+
+
+def test_a_stale_state_halts_the_tree_and_a_fresh_one_resumes(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    write_tree(tmp_path / "tree.json", _learned(_where_x_is_small(GO, TURN)))
+    parameters = {"tree_file": tmp_path / "tree.json", "enabled": True, "state_timeout": 0.2}
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        robot = Robot(peer)
+        robot.obeys("go")
+        _status(peer, "waiting for state")
+        silent = len(robot.commands)
+        _status(peer, "waiting for state")
+        assert len(robot.commands) == silent
+        robot.obeys("go")
+
+
+def test_no_command_follows_the_answer_to_a_disabling_call(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    parameters = {"enabled": True, "rate": 200.0}
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        robot = Robot(peer)
+        robot.obeys("go")
+        call = peer.begin("/executor/enable", False)
+        robot.until(call.done)
+        # What was sent before the answer may still be under way: the next report is behind it.
+        peer.diagnostics.clear()
+        robot.until(lambda: "executor: execution" in peer.diagnostics)
+        sent = values_of(peer.diagnostics["executor: execution"])["commands"]
+        assert values_of(peer.diagnostics["executor: execution"])["condition"] == "disabled"
+        peer.diagnostics.clear()
+        robot.until(lambda: "executor: execution" in peer.diagnostics)
+        assert values_of(peer.diagnostics["executor: execution"])["commands"] == sent
+        assert len(robot.commands) == int(sent)
+        assert peer.call("/executor/enable", True).success
+        robot.obeys("go")
+
+
+def test_a_refused_document_keeps_the_tree_running(domain: int, peer: Peer, tmp_path: Path) -> None:
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}) as executor:
+        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        robot = Robot(peer)
+        robot.obeys("go")
+        wave = Action("wave", "arm")
+        bad_name = _learned(_where_x_is_small(TURN, GO), topic="no topic")
+        refused = [
+            "{",
+            "[]",
+            dumps(_learned(_where_x_is_small(TURN, GO))).replace("0.5", "NaN"),
+            dumps(_learned(_where_x_is_small(TURN, GO))).replace('"x"', '"z"', 1),
+            dumps(_learned(_where_x_is_small(wave, GO))),
+            dumps(bad_name),
+        ]
+        for count, document in enumerate(refused, 1):
+            _publish(peer, document)
+            robot.until(
+                lambda count=count: (
+                    (one := peer.diagnostics.get("executor: execution"))
+                    and values_of(one)["refused trees"] == str(count)
+                ),
+                f"refusal {count}",
+            )
+            robot.obeys("go")
+        executor.says("a behavior tree was refused (the tree before it stays)")
+        assert {one.data for one in robot.commands} == {"go"}
+        _publish(peer, _learned(_where_x_is_small(STOP, GO)))
+        robot.obeys("stop")
+
+
+def test_bad_state_messages_are_counted_and_let_the_state_go_stale(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}):
+        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        robot = Robot(peer)
+        robot.state = (float("nan"), 0.0)
+        robot.obeys("go")  # The tree does not test the first value.
+        for state, kind in (
+            ((7.0, float("nan")), "value that is not finite"),
+            ((7.0, float("-inf")), "value that is not finite"),
+            ((7.0,), "unexpected length"),
+        ):
+            robot.state = state
+            robot.until(
+                lambda kind=kind: (
+                    (one := peer.diagnostics.get("executor: execution"))
+                    and values_of(one)["condition"] == "waiting for state"
+                    and kind in values_of(one)
+                ),
+                kind,
+            )
+            robot.state = (7.0, 0.0)
+            robot.obeys("go")
+
+
+def test_commands_on_change_are_sent_once(domain: int, peer: Peer, tmp_path: Path) -> None:
+    parameters = {"enabled": True, "publish": "on_change", "rate": 100.0}
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        robot = Robot(peer)
+        robot.obeys("go")
+        robot.state = (7.0, 1.0)
+        robot.obeys("turn")
+        robot.state = (7.0, 0.0)
+        robot.obeys("go")
+        assert [one.data for one in robot.commands] == ["go", "turn", "go"]
+
+
+def test_an_action_runs_until_its_result_comes(domain: int, peer: Peer, tmp_path: Path) -> None:
+    tree = Selector((Sequence((GO, TURN), memory=True), STOP))
+    parameters = {
+        "enabled": True,
+        "publish": "on_change",
+        "action_result_topic": "result",
+        "rate": 100.0,
+    }
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        _publish(peer, _learned(tree))
+        robot = Robot(peer)
+        snapshots = peer.listen(String, "/executor/snapshot")
+        commands = robot.commands
+
+        def sent(*labels: str) -> None:
+            peer.wait_until(
+                lambda: [one.data for one in commands] == list(labels), what=f"{labels}"
+            )
+
+        def running(*statuses: str) -> None:
+            peer.wait_until(
+                lambda: snapshots and json.loads(snapshots[-1].data)["nodes"] == list(statuses),
+                what=f"{statuses}",
+            )
+
+        sent("go")
+        running("RUNNING", "RUNNING", "RUNNING", "INVALID", "INVALID")
+        peer.action("turn:success", topic="result")  # Not what is running.
+        peer.action("perhaps", topic="result")
+        _status(peer, "running", unknown_action_result="1")
+        assert [one.data for one in commands] == ["go"]
+        peer.action("go:success", topic="result")
+        sent("go", "turn")
+        running("RUNNING", "RUNNING", "SUCCESS", "RUNNING", "INVALID")
+        peer.action("failure", topic="result")
+        sent("go", "turn", "stop")
+        peer.action("success", topic="result")
+        sent("go", "turn", "stop", "go")
+        _publish(peer, _learned(_where_x_is_small(TURN, STOP)))
+        robot.obeys("turn")  # The running action was interrupted.
+
+
+def test_a_swapped_tree_knows_what_was_done_before(domain: int, peer: Peer, tmp_path: Path) -> None:
+    after_stop = Condition(Literal(LastActionIs("stop", ("turn",))))
+    second = Selector((Sequence((after_stop, TURN)), _where_x_is_small(GO, STOP)))
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}):
+        _publish(peer, _learned(_where_x_is_small(STOP, GO)))
+        robot = Robot(peer)
+        robot.obeys("stop")
+        _publish(peer, _learned(second))
+        robot.obeys("turn")
+        assert "go" not in {one.data for one in robot.commands}
+
+
+def test_snapshots_are_sent_when_something_changed(domain: int, peer: Peer, tmp_path: Path) -> None:
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True, "rate": 100.0}):
+        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        robot = Robot(peer)
+        robot.obeys("go")
+        snapshots = peer.listen(String, "/executor/snapshot")
+        robot.until(lambda: snapshots)
+        first = json.loads(snapshots[-1].data)
+        assert first["nodes"] == ["SUCCESS", "SUCCESS", "SUCCESS", "SUCCESS", "INVALID"]
+        assert first["command"] == "go"
+        assert first["tip"]
+        before = len(snapshots)
+        peer.diagnostics.clear()
+        robot.until(lambda: "executor: execution" in peer.diagnostics)
+        assert len(snapshots) == before
+        robot.state = (7.0, 1.0)
+        robot.until(lambda: json.loads(snapshots[-1].data)["command"] == "turn")
+
+
+def test_a_tree_from_a_table_reads_the_state_topic_in_its_order(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    write_tree(tmp_path / "tree.json", _learned(_where_x_is_small(GO, TURN), topic=None))
+    parameters = {"tree_file": tmp_path / "tree.json", "enabled": True, "state_topic": "sensors"}
+    arguments = ["-r", "sensors:=/state", "-r", "__ns:=/robot", "-r", "command:=/command"]
+    with NodeProcess("executor_node", domain, tmp_path, parameters, arguments):
+        Robot(peer).obeys("go")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_quietly_while_it_commands(
+    domain: int, peer: Peer, tmp_path: Path, number: signal.Signals
+) -> None:
+    with NodeProcess(
+        "executor_node", domain, tmp_path, {"enabled": True, "rate": 1000.0}
+    ) as executor:
+        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        Robot(peer).obeys("go")
+        assert executor.stop(number) == 0
+        assert "Traceback" not in executor.stderr
+
+
+@pytest.mark.parametrize(
+    ("parameters", "sentence"),
+    [
+        ({"rate": 0.0}, "parameter 'rate' must be in [0.1, 1000], not 0.0."),
+        ({"rate": 20}, "parameter 'rate' must be a number with a decimal point"),
+        ({"publish": "never"}, "must be one of: every_tick, on_change, not 'never'."),
+        ({"tree_file": "/absent.json"}, "/absent.json"),
+    ],
+)
+def test_a_wrong_start_is_one_sentence_and_exit_code_1(
+    domain: int, tmp_path: Path, parameters: dict[str, object], sentence: str
+) -> None:
+    with NodeProcess("executor_node", domain, tmp_path, parameters) as executor:
+        assert executor.wait() == 1
+        assert sentence in executor.stderr
+        assert len(executor.stderr.splitlines()) == 1

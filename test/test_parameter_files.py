@@ -1,0 +1,58 @@
+"""The parameter files: they work as they are, and say what holds without them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
+from rclpy.parameter import parameter_value_to_python
+from ros_processes import CHECKOUT, NodeProcess, Peer, own_domain
+
+#: What every node has.
+_BUILT_IN = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
+
+
+def _ask(peer: Peer, kind: Any, service: str, request: Any) -> Any:
+    client = peer.node.create_client(kind, service)
+    peer.wait_until(client.service_is_ready, what=service)
+    future = client.call_async(request)
+    peer.wait_until(future.done, what=f"the answer of {service}")
+    return future.result()
+
+
+def _parameters(node: str, directory: Path, arguments: list[str]) -> dict[str, Any]:
+    """The value of each parameter, once it is checked that it is described."""
+    with (
+        own_domain() as domain,
+        NodeProcess(f"{node}_node", domain, directory, arguments=arguments) as process,
+        Peer(domain) as peer,
+    ):
+        listed = _ask(peer, ListParameters, f"{node}/list_parameters", ListParameters.Request())
+        names = [name for name in listed.result.names if not _BUILT_IN.fullmatch(name)]
+        described = _ask(
+            peer,
+            DescribeParameters,
+            f"{node}/describe_parameters",
+            DescribeParameters.Request(names=names),
+        )
+        assert [one.name for one in described.descriptors if not one.description] == []
+        got = _ask(
+            peer, GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names)
+        )
+        assert process.stop() == 0
+    return dict(zip(names, map(parameter_value_to_python, got.values), strict=True))
+
+
+@pytest.mark.parametrize("node", ["recorder", "learner", "executor"])
+def test_a_parameter_file_lists_every_parameter_with_its_default(node: str, tmp_path: Path) -> None:
+    file = CHECKOUT / "config" / f"{node}.yaml"
+    defaults = _parameters(node, tmp_path, [])
+    assert _parameters(node, tmp_path, ["--params-file", str(file)]) == defaults
+    listed = re.findall(r"^    (\w+):", file.read_text(), flags=re.MULTILINE)
+    assert sorted(listed) == sorted(defaults)

@@ -1,0 +1,147 @@
+"""Prediction on many states at once equals a first tick of the runtime in each of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import strategies as some
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.prediction import (
+    States,
+    choose,
+    last_action_column,
+    last_action_of,
+    triggered,
+)
+from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import LastActionIs, Literal
+
+GO, GRASP, TURN, WAIT = some.ACTIONS
+
+rows = st.lists(some.states, max_size=12)
+taken = st.lists(st.sampled_from(some.LABELS), max_size=6)
+
+
+def values(drawn: list[tuple[float, ...]]) -> np.ndarray:
+    return np.array(drawn, dtype=np.float64).reshape(len(drawn), len(some.FEATURES))
+
+
+def first_ticks(
+    tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
+) -> list[tuple[nodes.Action, ...]]:
+    """What a runtime of its own, with the given history, takes in each state."""
+    learned = some.learned(tree)
+    return [
+        TreeRuntime(learned, histories={some.CHANNEL: ActionHistory(earlier)}).tick(state).actions
+        for state in drawn
+    ]
+
+
+@settings(max_examples=120)
+@given(some.trees(repeaters=False), rows, taken)
+def test_what_is_triggered_is_what_a_first_tick_takes(
+    tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
+) -> None:
+    history = last_action_of(ActionHistory(earlier))
+    ticked = triggered(tree, States(some.FEATURES, values(drawn), history))
+    assert tuple(ticked) == nodes.actions(tree)
+    for row, actions in enumerate(first_ticks(tree, drawn, earlier)):
+        assert {action for action, where in ticked.items() if where[row]} == set(actions)
+
+
+@settings(max_examples=80)
+@given(some.trees(repeaters=False), rows, taken)
+def test_what_is_chosen_is_the_first_action_that_the_tree_names_of_those_taken(
+    tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
+) -> None:
+    states = States(some.FEATURES, values(drawn), last_action_of(ActionHistory(earlier)))
+    chosen = choose(tree, some.ACTIONS, states)
+    assert chosen.dtype == np.int64
+    for code, actions in zip(chosen.tolist(), first_ticks(tree, drawn, earlier), strict=True):
+        named = [one for one in nodes.actions(tree) if one in actions]
+        assert code == (some.ACTIONS.index(named[0]) if named else NO_ACTION)
+
+
+@settings(max_examples=80)
+@given(some.rule_trees(), rows, taken)
+def test_what_a_tree_of_rules_chooses_is_what_its_tick_takes(
+    tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
+) -> None:
+    states = States(some.FEATURES, values(drawn), last_action_of(ActionHistory(earlier)))
+    for code, actions in zip(
+        choose(tree, some.ACTIONS, states).tolist(),
+        first_ticks(tree, drawn, earlier),
+        strict=True,
+    ):
+        assert actions == (() if code == NO_ACTION else (some.ACTIONS[code],))
+
+
+@settings(max_examples=60)
+@given(some.literals(), some.tables(max_rows=12))
+def test_literals_hold_where_their_definition_says_with_lat_from_a_column(
+    literal: Literal, table: DemonstrationTable
+) -> None:
+    column = last_action_column(table.actions, table.last)
+    satisfied = States(table.features, table.states, column).satisfy(literal)
+    labels = dict(enumerate(table.actions))
+    assert satisfied.tolist() == [
+        some.holds(literal, state, labels.get(last))
+        for state, last in zip(table.states.tolist(), table.last.tolist(), strict=True)
+    ]
+
+
+def test_a_column_of_lat_is_read_whatever_is_decided() -> None:
+    states = States(some.FEATURES, np.zeros((3, 4)), last_action_column(("go", "turn"), LAST))
+    for deciding in ((), ("turn",), ("go", "turn")):
+        after_go = Literal(LastActionIs("go", deciding))
+        assert states.satisfy(after_go).tolist() == [False, True, False]
+        assert states.satisfy(~after_go).tolist() == [True, False, True]
+
+
+LAST = np.array([NO_ACTION, 0, 1])
+
+
+def test_an_action_that_the_column_does_not_know_was_never_the_last_one() -> None:
+    states = States(some.FEATURES, np.zeros((3, 4)), last_action_column(("go", "turn"), LAST))
+    never = Literal(LastActionIs("grasp"))
+    assert not states.satisfy(never).any()
+    assert states.satisfy(~never).all()
+
+
+def test_a_condition_that_is_tested_again_gives_the_same_answer() -> None:
+    drawn = values([(0.1, 0, 0, 0), (0.9, 0, 0, 0)])
+    states = States(some.FEATURES, drawn, last_action_of(ActionHistory()))
+    near = some.at_most("distance", 0.3)
+    twice = nodes.Sequence((some.when(~near, then=GO), some.when(near, then=TURN)))
+    triggered(twice, states)
+    assert states.satisfy(near).tolist() == [True, False]
+    assert states.satisfy(~near).tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("tree", "chosen"),
+    [
+        (GO, 0),
+        (nodes.Sequence((TURN, GO)), 2),
+        (nodes.Selector((TURN, GO)), 2),
+        (nodes.ParallelSelector((WAIT, GO)), 3),
+        (nodes.Parallel((GRASP, GO)), 1),
+        (nodes.Repeater((TURN, WAIT)), 2),
+        (nodes.Selector((nodes.Inverter(GRASP), GO)), 1),
+        (nodes.Condition(some.at_most("distance", 0.3)), NO_ACTION),
+    ],
+)
+def test_known_trees(tree: nodes.Node, chosen: int) -> None:
+    states = States(some.FEATURES, np.zeros((2, 4)), last_action_of(ActionHistory()))
+    assert choose(tree, some.ACTIONS, states).tolist() == [chosen] * 2
+
+
+def test_no_rows_give_no_choices() -> None:
+    states = States(some.FEATURES, np.empty((0, 4)), last_action_of(ActionHistory()))
+    assert choose(GO, some.ACTIONS, states).tolist() == []
+    assert len(states) == 0
