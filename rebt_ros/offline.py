@@ -35,14 +35,12 @@ _DECIDING_PACKAGES = ("numpy", "scikit-learn", "pyeda", "py_trees")
 class OfflineLearning:
     """A tree learned from files."""
 
-    learning: Learning
+    learned: LearnedTree
+    """The value of the behavior tree document."""
+    learnings: tuple[Learning, ...]
+    """What it was made from, for each channel."""
     notes: tuple[str, ...]
-    """What a person should know about the inputs."""
-
-    @property
-    def learned(self) -> LearnedTree:
-        """The value of the behavior tree document."""
-        return self.learning.learned
+    """What a person should know about the inputs; no full stops."""
 
 
 def learn(
@@ -70,9 +68,12 @@ def learn(
     options = options or LearnOptions()
     progress("reading", 0.0)
     loaded = load([Path(one) for one in inputs], reading or InputOptions())
-    table = pipeline.only_channel(tabulate(loaded.demonstrations, declared))
-    notes = (*loaded.notes, *_doubts(table))
-    result = OfflineLearning(pipeline.learn_from(table, options, progress), notes)
+    tables = tabulate(loaded.demonstrations, declared)
+    learnings = pipeline.learn_channels(tables, options, progress)
+    doubts = (doubt for table in tables for doubt in _doubts(table))
+    further = (note for learning in learnings for note in learning.notes)
+    notes = (*loaded.notes, *doubts, *further)
+    result = OfflineLearning(pipeline.side_by_side(learnings), learnings, notes)
     if out is not None:
         _write(Path(out), result, [str(one) for one in inputs], options)
     return result
@@ -83,13 +84,16 @@ def replay(
     inputs: Sequence[str | Path],
     *,
     reading: InputOptions | None = None,
-) -> Replay:
+) -> tuple[Replay, ...]:
     """Runs a tree over the rows of bags, recordings and CSV tables.
 
     Args:
         tree: A learned tree, or the file of one.
         inputs: Each one or more demonstrations.
         reading: How to read the inputs.
+
+    Returns:
+        One for each channel of the tree that was recorded.
 
     Raises:
         RebtError: The tree or an input cannot be used, or they do not fit each other.
@@ -115,7 +119,7 @@ def _write(
     write_text_atomically(directory / "tree.svg", render_svg(learned))
     write_text_atomically(directory / "tree.dot", render_dot(learned))
     write_text_atomically(directory / "tree.txt", render_text(learned))
-    summary = summarize(result.learning) | {
+    summary = summarize(result) | {
         "inputs": list(inputs),
         "notes": list(result.notes),
         "random_state": options.random_state,
@@ -127,18 +131,17 @@ def _write(
     write_text_atomically(directory / "summary.json", text + "\n")
 
 
-def summarize(learning: Learning) -> dict[str, Any]:
+def summarize(result: OfflineLearning) -> dict[str, Any]:
     """The figures of a learned tree, as written to summary.json."""
-    learned, provenance = learning.learned, learning.learned.provenance
+    learned, provenance = result.learned, result.learned.provenance
     figures = provenance.figures
-    return {
+    summary = {
         "rows": provenance.rows,
         "demonstrations": provenance.demonstrations,
         "features": [feature.name for feature in learned.features],
         "actions": [action.label for action in learned.actions],
         "nodes": nodes.size(learned.tree),
         "depth": nodes.depth(learned.tree),
-        "decision_tree_leaves": sum(1 for _ in learning.decision_tree.tree.paths()),
         "fidelity_mismatches": figures.fidelity_mismatches,
         "held_out_rows": figures.held_out_rows,
         "teacher_forced_agreement": figures.teacher_forced_agreement,
@@ -147,8 +150,40 @@ def summarize(learning: Learning) -> dict[str, Any]:
         "root": provenance.root.value,
         "delta": provenance.delta,
         "max_depth": provenance.max_depth,
-        "psa": learning.policy.psa,
         "ccp_alpha": provenance.ccp_alpha,
+        "suggestions": [
+            {
+                "id": one.id,
+                "kind": one.kind.value,
+                "support": one.support,
+                "nodes": nodes.size(one.subtree),
+                "attached": one.attached,
+            }
+            for one in learned.suggestions
+        ],
+    }
+    if len(result.learnings) == 1:
+        return summary | _choices(result.learnings[0])
+    return summary | {"channels": {one.table.channel: _of_channel(one) for one in result.learnings}}
+
+
+def _of_channel(learning: Learning) -> dict[str, Any]:
+    figures = learning.learned.provenance.figures
+    return {
+        "rows": learning.learned.provenance.rows,
+        "nodes": nodes.size(learning.learned.tree),
+        "ccp_alpha": learning.policy.ccp_alpha,
+        "fidelity_mismatches": figures.fidelity_mismatches,
+        "teacher_forced_agreement": figures.teacher_forced_agreement,
+        "own_history_agreement": figures.own_history_agreement,
+        **_choices(learning),
+    }
+
+
+def _choices(learning: Learning) -> dict[str, Any]:
+    return {
+        "decision_tree_leaves": sum(1 for _ in learning.decision_tree.tree.paths()),
+        "psa": learning.policy.psa,
         "reasons": list(learning.policy.reasons),
         "levels": list(_levels(learning.policy.levels)),
     }

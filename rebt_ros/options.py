@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from rebt_ros.algorithms.priority_root import ALL_REDUCTIONS, Reductions
+from rebt_ros.algorithms.suggestions import PsaChoice
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.errors import OptionError
 
@@ -49,6 +50,10 @@ class LearnOptions:
     """Whether the tree is learned from all rows in the end, once it has been judged."""
     random_state: int = 0
     """Decides between equally good splits."""
+    attach: tuple[str, ...] = ()
+    """Ids of the suggestions to attach, or `ALL`."""
+    psa_choice: PsaChoice | None = None
+    """What to turn all PSA nodes into; None to leave them to the user."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.delta <= 1:
@@ -63,6 +68,11 @@ class LearnOptions:
             )
         if not 0 <= self.random_state < 2**32:
             raise OptionError(f"random_state must be a 32-bit number, not {self.random_state}.")
+
+    @property
+    def is_paper(self) -> bool:
+        """Whether Algorithms 1 and 2 are followed as printed."""
+        return self.reductions is None
 
     @classmethod
     def paper(cls) -> LearnOptions:

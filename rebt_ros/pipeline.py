@@ -1,26 +1,30 @@
-"""From demonstrations to one learned tree."""
+"""From demonstrations to a learned tree."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rebt_ros import evaluation
+from rebt_ros.algorithms.suggestions import ALL
 from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance
+from rebt_ros.behavior_tree.learned_tree import (
+    ChannelProvenance,
+    Figures,
+    LearnedTree,
+    Provenance,
+)
 from rebt_ros.choosing import Policy, choose, convert
 from rebt_ros.decision_tree.training import TrainedTree, train
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
-from rebt_ros.errors import InputError
-from rebt_ros.options import DEFAULTS, LearnOptions, Use
-
-#: Former name of `Use`.
-LastActionUse = Use
+from rebt_ros.errors import InputError, OptionError
+from rebt_ros.options import DEFAULTS, LearnOptions
+from rebt_ros.suggesting import accept, suggest
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -34,6 +38,8 @@ class Learning:
     """Rows that the tree was judged on, shape (rows,)."""
     policy: Policy
     """What was chosen to learn, and why."""
+    notes: tuple[str, ...] = ()
+    """What a person should know about it; no full stops."""
 
 
 #: Told what is being done and which share of the work is behind.
@@ -45,7 +51,7 @@ def learn(
     options: LearnOptions = DEFAULTS,
     declared: Mapping[str, FeatureKind] | None = None,
 ) -> LearnedTree:
-    """Learns one behavior tree from all demonstrations.
+    """Learns a behavior tree from all demonstrations.
 
     Args:
         demonstrations: What was shown, oldest first.
@@ -53,25 +59,98 @@ def learn(
         declared: Kinds of features by name, where they should not be detected.
 
     Raises:
-        InputError: Too few rows or actions, features that differ, or more than one channel.
+        InputError: Too few rows or actions, or features that differ.
         OptionError: A declared kind does not fit its feature.
     """
-    return learn_from(only_channel(tabulate(demonstrations, declared)), options).learned
+    return side_by_side(learn_channels(tabulate(demonstrations, declared), options))
 
 
-def only_channel(tables: Sequence[DemonstrationTable]) -> DemonstrationTable:
-    """The table of demonstrations whose actions came on one channel.
+def learn_channels(
+    tables: Sequence[DemonstrationTable],
+    options: LearnOptions = DEFAULTS,
+    progress: Progress = lambda stage, share: None,
+) -> tuple[Learning, ...]:
+    """Learns one policy for each channel; see `learn`."""
+    for one in options.attach if len(tables) > 1 else ():
+        if one != ALL and not any(one.startswith(f"{table.channel}/") for table in tables):
+            raise OptionError(
+                f"there is no suggestion {one!r} to attach: with several channels, an id begins "
+                f"with its channel, such as {tables[0].channel}/psa-1."
+            )
 
-    Raises:
-        InputError: There are several channels.
-    """
-    if len(tables) > 1:
-        names = ", ".join(repr(table.channel) for table in tables)
-        raise InputError(
-            f"the demonstrations hold actions of {len(tables)} channels ({names}): "
-            "record or choose one action topic, as one tree decides for one channel."
+    def of_channel(place: int) -> Progress:
+        return lambda stage, share: progress(stage, (place + share) / len(tables))
+
+    return tuple(
+        learn_from(table, _of_channel(table.channel, options, len(tables)), of_channel(place))
+        for place, table in enumerate(tables)
+    )
+
+
+def _of_channel(channel: str, options: LearnOptions, channels: int) -> LearnOptions:
+    """The options with the ids of this channel's suggestions, which are led by its name."""
+    if channels == 1:
+        return options
+    led = f"{channel}/"
+    mine = (one.removeprefix(led) for one in options.attach if one == ALL or one.startswith(led))
+    return replace(options, attach=tuple(mine))
+
+
+def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
+    """One tree of the policies of several channels, which act at the same time."""
+    trees = [learning.learned for learning in learnings]
+    first = trees[0]
+    if len(trees) == 1:
+        return first
+    channels = tuple(
+        ChannelProvenance(
+            learning.table.channel,
+            one.provenance.rows,
+            one.provenance.ccp_alpha,
+            one.provenance.uses_last_action,
+            one.provenance.figures,
         )
-    return tables[0]
+        for learning, one in zip(learnings, trees, strict=True)
+    )
+    return LearnedTree(
+        first.features,
+        tuple(action for one in trees for action in one.actions),
+        nodes.Parallel(tuple(one.tree for one in trees)),
+        replace(
+            first.provenance,
+            demonstrations=max(one.provenance.demonstrations for one in trees),
+            rows=sum(one.rows for one in channels),
+            ccp_alpha=max(one.ccp_alpha for one in channels),
+            uses_last_action=any(one.uses_last_action for one in channels),
+            figures=_pooled([one.figures for one in channels]),
+            channels=channels,
+        ),
+        tuple(
+            replace(suggestion, id=f"{channel.channel}/{suggestion.id}")
+            for channel, one in zip(channels, trees, strict=True)
+            for suggestion in one.suggestions
+        ),
+    )
+
+
+def _pooled(figures: Sequence[Figures]) -> Figures:
+    """Figures over the rows of all channels."""
+    rows = sum(one.held_out_rows for one in figures)
+
+    def share(agreements: Sequence[float | None]) -> float | None:
+        agreeing = [
+            agreement * one.held_out_rows
+            for agreement, one in zip(agreements, figures, strict=True)
+            if agreement is not None
+        ]
+        return sum(agreeing) / rows if rows else None
+
+    return Figures(
+        sum(one.fidelity_mismatches for one in figures),
+        share([one.teacher_forced_agreement for one in figures]),
+        share([one.own_history_agreement for one in figures]),
+        rows,
+    )
 
 
 def learn_from(
@@ -79,11 +158,11 @@ def learn_from(
     options: LearnOptions = DEFAULTS,
     progress: Progress = lambda stage, share: None,
 ) -> Learning:
-    """Learns one behavior tree from a table; see `learn`."""
+    """Learns the policy of one channel; see `learn`."""
     if len(np.unique(table.chosen)) < 2:
         shown = table.actions[table.chosen[0]]
         raise InputError(
-            f"the {len(table)} rows show one action only ({shown!r}): "
+            f"the {len(table)} rows of channel {table.channel!r} show one action only ({shown!r}): "
             "demonstrate at least two, as there is nothing to decide between."
         )
     held_out = table.held_out(options.test_fraction)
@@ -102,7 +181,26 @@ def learn_from(
         tree = convert(trained, options, psa=policy.psa)
     mismatches = np.sum(evaluation.teacher_forced_choices(tree, table) != trained.predict(table))
     figures = Figures(int(mismatches), forced, own, int(held_out.sum()))
-    learned = LearnedTree(
+    learned_from = table if options.refit else shown
+    suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options)
+    tree, suggestions = accept(tree, suggestions, options)
+    learned = as_learned(table, trained, tree, policy.ccp_alpha, figures, options)
+    progress("done", 1.0)
+    return Learning(
+        replace(learned, suggestions=suggestions), trained, table, held_out, policy, notes
+    )
+
+
+def as_learned(
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    tree: nodes.Node,
+    ccp_alpha: float,
+    figures: Figures,
+    options: LearnOptions,
+) -> LearnedTree:
+    """A behavior tree with where it came from."""
+    return LearnedTree(
         table.features,
         evaluation.actions_of(table),
         tree,
@@ -111,14 +209,12 @@ def learn_from(
             rows=len(table),
             delta=options.delta,
             max_depth=options.max_depth,
-            ccp_alpha=policy.ccp_alpha,
+            ccp_alpha=ccp_alpha,
             root=options.root,
             uses_last_action=trained.uses_last_action,
             figures=figures,
         ),
     )
-    progress("done", 1.0)
-    return Learning(learned, trained, table, held_out, policy)
 
 
 def _refit(table: DemonstrationTable, options: LearnOptions, policy: Policy) -> TrainedTree:

@@ -35,8 +35,9 @@ class Disagreement:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Replay:
-    """What a tree did on recorded rows."""
+    """What a tree did on the recorded rows of one channel."""
 
+    channel: str
     rows: int
     teacher_forced_agreement: float
     own_history_agreement: float
@@ -48,23 +49,48 @@ class Replay:
     disagreements: tuple[Disagreement, ...]
 
 
-def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> Replay:
+def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tuple[Replay, ...]:
     """Runs a tree over recorded rows, in their order.
 
     Args:
         learned: The tree.
-        demonstrations: What was recorded; of several channels the tree's own is taken.
+        demonstrations: What was recorded.  A tree of one channel is run over a recording of one
+            channel, whatever their names; otherwise channels are matched by name.
+
+    Returns:
+        One for each channel of the tree that was recorded.
 
     Raises:
-        InputError: There are no rows, or they lack a feature that the tree tests.
+        InputError: There are no rows, or they lack a channel or a feature that the tree tests.
     """
-    table = _table_for(learned, demonstrations)
-    own = evaluation.own_history_choices(learned.tree, table)
-    forced = evaluation.teacher_forced_choices(learned.tree, table)
+    policies = nodes.policies(learned.tree)
+    tables = {table.channel: table for table in tabulate(demonstrations)}
+    if len(policies) == len(tables) == 1:
+        [(channel, policy)], [table] = policies.items(), tables.values()
+        return (_replay(learned, channel, policy, table),)
+    common = [channel for channel in policies if channel in tables]
+    if not common:
+        raise InputError(
+            f"the recording has actions on {', '.join(map(repr, tables))} but not on "
+            f"{', '.join(map(repr, policies))}, for which the tree decides: "
+            "choose the action topic."
+        )
+    return tuple(
+        _replay(learned, channel, policies[channel], tables[channel]) for channel in common
+    )
+
+
+def _replay(
+    learned: LearnedTree, channel: str, policy: nodes.Node, recorded: DemonstrationTable
+) -> Replay:
+    table = _as_the_tree_reads(learned, channel, policy, recorded)
+    own = evaluation.own_history_choices(policy, table)
+    forced = evaluation.teacher_forced_choices(policy, table)
     confusion = np.zeros((len(table.actions), len(table.actions) + 1), dtype=np.int64)
     # NO_ACTION is -1 and so counts in the last column.
     np.add.at(confusion, (table.chosen, own), 1)
     return Replay(
+        channel,
         len(table),
         float(np.mean(forced == table.chosen)),
         float(np.mean(own == table.chosen)),
@@ -89,19 +115,13 @@ def _disagreements(table: DemonstrationTable, chosen: IntArray) -> tuple[Disagre
     )
 
 
-def _table_for(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> DemonstrationTable:
-    """The rows as the tree reads them: its features, its channel, and its actions known."""
-    channel = learned.actions[0].channel
-    tables = {table.channel: table for table in tabulate(demonstrations)}
-    if len(tables) > 1 and channel not in tables:
-        raise InputError(
-            f"the recording has actions on {', '.join(map(repr, sorted(tables)))} but not on "
-            f"{channel!r}, for which the tree decides: choose one action topic."
-        )
-    table = tables[channel] if len(tables) > 1 else next(iter(tables.values()))
+def _as_the_tree_reads(
+    learned: LearnedTree, channel: str, policy: nodes.Node, table: DemonstrationTable
+) -> DemonstrationTable:
+    """The rows with the tree's features and channel, and with all of its actions known."""
     tested = {
         one.literal.condition.feature
-        for one in nodes.conditions(learned.tree)
+        for one in nodes.conditions(policy)
         if not isinstance(one.literal.condition, LastActionIs)
     }
     recorded = {feature.name: place for place, feature in enumerate(table.features)}
@@ -112,12 +132,13 @@ def _table_for(learned: LearnedTree, demonstrations: Sequence[Demonstration]) ->
             f"it has {', '.join(recorded)}."
         )
     columns = [
-        _as_the_tree_reads(feature, table.features[recorded[name]], table.states[:, recorded[name]])
+        _translated(feature, table.features[recorded[name]], table.states[:, recorded[name]])
         if (name := feature.name) in recorded
         else np.full(len(table), np.nan)
         for feature in learned.features
     ]
-    others = sorted({action.label for action in learned.actions} - set(table.actions))
+    mine = {action.label for action in learned.actions if action.channel == channel}
+    others = sorted(mine - set(table.actions))
     return replace(
         table,
         channel=channel,
@@ -127,7 +148,7 @@ def _table_for(learned: LearnedTree, demonstrations: Sequence[Demonstration]) ->
     )
 
 
-def _as_the_tree_reads(wanted: Feature, recorded: Feature, values: FloatArray) -> FloatArray:
+def _translated(wanted: Feature, recorded: Feature, values: FloatArray) -> FloatArray:
     if wanted.kind is not FeatureKind.CATEGORICAL:
         if recorded.kind is FeatureKind.CATEGORICAL:
             raise InputError(

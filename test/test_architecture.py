@@ -31,7 +31,7 @@ LAYERS: Final = (
     {"pipeline", "replay"},
     {"choosing"},
     {"selection", "options"},
-    {"evaluation", "simulation", "storage"},
+    {"evaluation", "pictures", "simulation", "storage"},
     {"algorithms"},
     {"decision_tree"},
     {"behavior_tree"},
@@ -64,6 +64,7 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 HOMES: Final = {
     "jsonschema": ("rebt_ros.behavior_tree.document",),
     "joblib": ("rebt_ros.commands.bench_*",),
+    "matplotlib": ("rebt_ros.pictures.*",),
     "py_trees": (
         "rebt_ros.behavior_tree.runtime",
         "rebt_ros.ros",

@@ -25,7 +25,7 @@ from rebt_ros.behavior_tree.document import loads
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.options import LearnOptions, Use
-from rebt_ros.pipeline import Learning, learn_from, only_channel
+from rebt_ros.pipeline import Learning, learn_from
 from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.inputs import load
 
@@ -70,7 +70,7 @@ def _learning(table: DemonstrationTable) -> Learning:
 
 
 def _table(demonstrations: tuple[Demonstration, ...]) -> DemonstrationTable:
-    return only_channel(tabulate(demonstrations))
+    return tabulate(demonstrations)[0]
 
 
 def _predictions(learning: Learning, states: list[tuple[float, ...]]) -> list[str]:

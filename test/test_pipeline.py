@@ -20,7 +20,6 @@ from rebt_ros.options import LearnOptions, Use
 from rebt_ros.pipeline import (
     learn,
     learn_from,
-    only_channel,
     summary_sentence,
 )
 from rebt_ros.storage.inputs import InputOptions
@@ -123,12 +122,13 @@ def test_two_rows_are_enough() -> None:
     assert learned.provenance.figures.fidelity_mismatches == 0
 
 
-def test_actions_on_two_channels_are_refused_with_their_names() -> None:
+def test_one_action_only_on_one_of_two_channels_is_refused_with_its_name() -> None:
     builder = DemonstrationBuilder([StateTopic("state")], ["arm", "base"])
     builder.observe(0, "state", [1.0])
     rows = [*builder.act(1, "arm", "grasp"), *builder.act(2, "base", "go")]
+    rows += builder.act(3, "base", "wait")
     both = Demonstration.from_rows("both", builder.features or (), rows)
-    with pytest.raises(InputError, match=r"2 channels \('arm', 'base'\)"):
+    with pytest.raises(InputError, match="channel 'arm' show one action only"):
         learn([both])
 
 
@@ -157,7 +157,7 @@ def test_options_out_of_range_are_refused_by_name(wrong: dict[str, float]) -> No
 
 @pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])
 def test_a_parallel_and_a_selector_root_choose_alike(root: Root) -> None:
-    table = only_channel(tabulate([turning_and_going("one", 1), there_and_back("two")]))
+    table = tabulate([turning_and_going("one", 1), there_and_back("two")])[0]
     learning = learn_from(table, LearnOptions(root=root, max_depth=None))
     chosen = evaluation.teacher_forced_choices(learning.learned.tree, table)
     assert (chosen == learning.decision_tree.predict(table)).all()

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.dot import render_dot
+from rebt_ros.behavior_tree.figures import PALETTE
 from rebt_ros.behavior_tree.layout import Box, Layout, outline, top_down
 from rebt_ros.behavior_tree.learned_tree import (
     Figures,
@@ -23,7 +24,7 @@ from rebt_ros.behavior_tree.learned_tree import (
     Suggestion,
     SuggestionKind,
 )
-from rebt_ros.behavior_tree.svg import PALETTE, render_svg
+from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import IsTrue, LastActionIs, Literal, Threshold

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from itertools import count
 
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.figures import PALETTE
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.svg import PALETTE
 from rebt_ros.behavior_tree.wording import Kind, Wording, heading, offered, summary
 
 _SHAPES = {Kind.CONDITION: "ellipse", Kind.INVERTER: "ellipse"}
@@ -23,21 +23,21 @@ def render_dot(learned: LearnedTree) -> str:
     """The main tree, a dashed cluster for each suggestion that is not attached, and a legend."""
     wording = Wording(learned)
     numbers = count()
-    lines = [f"  label={_quoted(f'Behavior tree: {summary(learned)}')};"]
+    lines = [f"  label={quoted(f'Behavior tree: {summary(learned)}')};"]
     lines += _tree(learned.tree, wording, numbers, indent="  ")
     shown = [learned.tree]
     for number, suggestion in enumerate(offered(learned)):
         shown.append(suggestion.subtree)
         lines += [
             f"  subgraph cluster_suggestion_{number} {{",
-            f'    label={_quoted(heading(suggestion))}; style=dashed; color="#8aa2bb";',
+            f'    label={quoted(heading(suggestion))}; style=dashed; color="#8aa2bb";',
             *_tree(suggestion.subtree, wording, numbers, indent="    "),
             "  }",
         ]
     kinds = {wording.kind(node) for tree in shown for node in nodes.walk(tree)}
     lines += ["  subgraph cluster_legend {", '    label="Legend"; color="#d5dde5";']
     lines += [
-        f"    legend_{kind.name.lower()} [{_looks(kind)}, label={_quoted(kind.value)}];"
+        f"    legend_{kind.name.lower()} [{looks(kind)}, label={quoted(kind.value)}];"
         for kind in Kind
         if kind in kinds
     ]
@@ -51,15 +51,16 @@ def _tree(tree: nodes.Node, wording: Wording, numbers: Iterator[int], indent: st
         node, parent = waiting.pop()
         name = f"n{next(numbers)}"
         yield (
-            f"{indent}{name} [{_looks(wording.kind(node))}, label={_quoted(wording.node(node))},"
-            f" tooltip={_quoted(wording.explanation(node))}];"
+            f"{indent}{name} [{looks(wording.kind(node))}, label={quoted(wording.node(node))},"
+            f" tooltip={quoted(wording.explanation(node))}];"
         )
         if parent is not None:
             yield f"{indent}{parent} -> {name};"
         waiting.extend((child, name) for child in reversed(nodes.children(node)))
 
 
-def _looks(kind: Kind) -> str:
+def looks(kind: Kind) -> str:
+    """The attributes of a node of this kind."""
     colors = PALETTE[kind]
     return (
         f'shape={_SHAPES.get(kind, "box")}, fillcolor="{colors.fill}", color="{colors.line}",'
@@ -67,7 +68,7 @@ def _looks(kind: Kind) -> str:
     )
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
     """A double-quoted string that Graphviz shows as it is.
 
     Backslashes would start its escapes and ampersands its character entities; line breaks and what

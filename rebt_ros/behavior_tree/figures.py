@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from rebt_ros.behavior_tree.drawing import (
+    FADED,
     PAGE_WIDTH,
     SIZE,
     SMALL_SIZE,
@@ -104,8 +105,12 @@ def drawn(figures: Sequence[Figure]) -> Drawing:
     Trees that are neither large nor wide are drawn from the top down; others as an outline, in
     which leaves follow their parent to the right and other children stand indented below it.
     """
-    layout = _layout([figure.box for figure in figures])
+    layout = _layout(figures)
     marks: list[Mark] = [Line(_whole(link)) for link in layout.links]
+    # The root has no link.
+    for link, figure in zip(layout.links, figures[1:], strict=True):
+        if figure.answer:
+            marks += _answer(figure.answer, link)
     for corner, figure in zip(layout.corners, figures, strict=True):
         marks += _nodes(figure, corner)
     return Drawing(tuple(marks), layout.width, layout.height)
@@ -117,13 +122,29 @@ def legend(kinds: Iterable[Kind], width: float = PAGE_WIDTH) -> Drawing:
     return shelves([_chip(kind) for kind in Kind if kind in occurring], width, gap=16.0)
 
 
-def _layout(boxes: Sequence[Box]) -> Layout:
+def _layout(figures: Sequence[Figure]) -> Layout:
+    boxes = [figure.box for figure in figures]
     leaves = len(boxes) - len({box.parent for box in boxes} - {None})
+    if any(figure.answer for figure in figures):
+        # Links are long enough for the words on them.
+        levels, lines = {"level_gap": 48.0}, {"indent": 72.0, "gap": 44.0}
+    else:
+        levels, lines = {}, {}
     if leaves <= _TOP_DOWN_LEAVES:
-        layout = top_down(boxes)
+        layout = top_down(boxes, **levels)
         if layout.width <= _TOP_DOWN_WIDTH:
             return layout
-    return outline(boxes, width=PAGE_WIDTH)
+    return outline(boxes, width=PAGE_WIDTH, **lines)
+
+
+def _answer(word: str, link: tuple[Point, ...]) -> tuple[Panel, Text]:
+    """The word, on white, at the last bend of a link from above or halfway from the left."""
+    (x, y), (end_x, end_y) = link[-2:]
+    if end_y == y:
+        x = (x + end_x) / 2
+    width, height = text_width(word, SMALL_SIZE) + 6, SMALL_SIZE + 4
+    white = Panel(x - width / 2, y - height / 2, width, height, 0, 0, "#ffffff", "#ffffff")
+    return white, Text(x, y + _MIDDLE * SMALL_SIZE, word, FADED, SMALL_SIZE, centered=True)
 
 
 def _whole(points: Iterable[Point]) -> tuple[Point, ...]:

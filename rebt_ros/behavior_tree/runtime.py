@@ -134,7 +134,7 @@ class TreeRuntime:
             self._build(child, self.histories[channel]) for channel, child in side_by_side.items()
         ]
         # A channel that has nothing to do must not halt what runs on another one.
-        never_failing = [
+        never_failing: list[py_trees.behaviour.Behaviour] = [
             py_trees.decorators.FailureIsSuccess(name=channel, child=family[0])
             for channel, family in zip(side_by_side, families, strict=True)
         ]

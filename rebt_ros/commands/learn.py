@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from dataclasses import fields, replace
 from enum import Enum
 from pathlib import Path
@@ -10,7 +11,9 @@ from typing import Any, Literal
 
 from rebt_ros import offline
 from rebt_ros.algorithms.priority_root import Reductions
-from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.algorithms.suggestions import PsaChoice
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import add_input_options, input_options, run, use_color
@@ -87,6 +90,20 @@ def _parser() -> argparse.ArgumentParser:
         metavar=_values(Use),
         help="whether PSA nodes stand in the tree; auto as above (default: auto)",
     )
+    learning.add_argument(
+        "--attach",
+        action="append",
+        default=[],
+        metavar="ID|all",
+        help="attach a suggested subtree to the root; repeatable",
+    )
+    learning.add_argument(
+        "--psa-as",
+        type=PsaChoice,
+        choices=list(PsaChoice),
+        metavar=_values(PsaChoice),
+        help="turn all PSA nodes into this (default: leave the choice open)",
+    )
     for reduction in fields(Reductions):
         learning.add_argument(
             f"--no-{reduction.name.replace('_', '-')}",
@@ -144,6 +161,8 @@ def _options(parsed: argparse.Namespace) -> LearnOptions:
         **asked,
         test_fraction=parsed.test_fraction,
         refit=parsed.refit,
+        attach=tuple(parsed.attach),
+        psa_choice=parsed.psa_as,
         random_state=parsed.random_state,
     )
 
@@ -164,11 +183,16 @@ def _learn(parsed: argparse.Namespace) -> None:
     for note in result.notes:
         print(f"note: {note}.")
     print()
-    print(render_text(result.learned, color=use_color()))
+    # The suggestions are listed below, and drawn in the files.
+    print(render_text(replace(result.learned, suggestions=()), color=use_color()))
     print(summary_sentence(result.learned))
     print(_judgement(result))
-    for reason in result.learning.policy.reasons:
-        print(f"  - {reason}")
+    for learning in result.learnings:
+        channel = f"{learning.table.channel}: " if len(result.learnings) > 1 else ""
+        for reason in learning.policy.reasons:
+            print(f"  - {channel}{reason}")
+    if result.learned.suggestions:
+        print("\n".join(_suggestions(result.learned)))
     print(f"Written to {parsed.out}: tree.json, summary.json, tree.svg, tree.dot, tree.txt.")
 
 
@@ -182,6 +206,15 @@ def _declared(parsed: argparse.Namespace) -> dict[str, FeatureKind]:
                     "give it one kind."
                 )
     return declared
+
+
+def _suggestions(learned: LearnedTree) -> Iterator[str]:
+    yield "Suggested subtrees (attach with --attach ID):"
+    width = max(len(one.id) for one in learned.suggestions)
+    for one in learned.suggestions:
+        shown = " → ".join(action.label for action in nodes.actions(one.subtree))
+        mark = ", attached" if one.attached else ""
+        yield f"  {one.id:<{width}}  {shown}  (seen {one.support} times{mark})"
 
 
 def _judgement(result: offline.OfflineLearning) -> str:

@@ -35,13 +35,22 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _replay(parsed: argparse.Namespace) -> None:
-    result = offline.replay(parsed.tree, parsed.inputs, reading=input_options(parsed))
+    results = offline.replay(parsed.tree, parsed.inputs, reading=input_options(parsed))
+    for place, result in enumerate(results):
+        if place:
+            print()
+        if len(results) > 1:
+            print(f"Channel {result.channel}:")
+        _print(result, max(parsed.disagreements, 0))
+
+
+def _print(result: Replay, most: int) -> None:
     print(f"{result.rows} rows")
     print(f"  agreement, own history    {result.own_history_agreement:.2%}")
     print(f"  agreement, teacher-forced {result.teacher_forced_agreement:.2%}")
     print()
     print("\n".join(_confusion_table(result)))
-    listed = result.disagreements[: max(parsed.disagreements, 0)]
+    listed = result.disagreements[:most]
     if listed:
         print()
         print(f"First {len(listed)} of {len(result.disagreements)} disagreements:")

@@ -42,6 +42,28 @@ class PruningPath:
         # As in scikit-learn, 0 means not to prune, also where that would cost nothing.
         return np.less_equal(self.collapse, ccp_alpha if ccp_alpha > 0 else -np.inf)
 
+    def leaf_counts(self) -> IntArray:
+        """Leaves of the tree at each level, shape (levels,)."""
+        first, end = self.levels_decided(self.alphas)
+        change = np.zeros(len(self) + 1, dtype=np.int64)
+        np.add.at(change, first, 1)
+        np.add.at(change, end, -1)
+        return np.cumsum(change)[:-1]
+
+    def levels_decided(self, ccp_alphas: FloatArray) -> tuple[IntArray, IntArray]:
+        """The first level at which each node is a leaf, and the first at which it is cut off.
+
+        Args:
+            ccp_alphas: The levels, ascending, shape (levels,).
+
+        Returns:
+            Positions of levels, or their number where there is none, both of shape (nodes,).
+        """
+        # 0 does not prune, also not what could be pruned at no cost.
+        levels = np.where(ccp_alphas > 0, ccp_alphas, -np.inf)
+        first = np.searchsorted(levels, self.collapse, side="left")
+        return first, np.where(self.parents < 0, len(levels), first[self.parents])
+
     def standing(self, is_leaf: BoolArray) -> IntArray:
         """For each node, itself or the topmost of the given leaves above it, shape (nodes,)."""
         standing = np.arange(len(is_leaf))

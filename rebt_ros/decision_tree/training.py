@@ -75,12 +75,8 @@ class FittedTree:
         node_of_entry = np.repeat(np.arange(tree.node_count), np.diff(reached.indptr))
         right = table.chosen[reached.indices] == majority[node_of_entry]
         predicted = np.bincount(node_of_entry[right], minlength=tree.node_count)
-        # 0 does not prune, also not what could be pruned at no cost.
-        levels = np.where(ccp_alphas > 0, ccp_alphas, -np.inf)
-        first = np.searchsorted(levels, self.path.collapse, side="left")
-        parents = self.path.parents
-        end = np.where(parents < 0, len(levels), first[parents])
-        change = np.zeros(len(levels) + 1)
+        first, end = self.path.levels_decided(ccp_alphas)
+        change = np.zeros(len(ccp_alphas) + 1)
         np.add.at(change, first, predicted)
         np.add.at(change, end, -predicted)
         return np.asarray(np.cumsum(change)[:-1] / len(table))

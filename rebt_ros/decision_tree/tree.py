@@ -43,6 +43,28 @@ class DecisionTree:
     actions: tuple[Action, ...]
     root: DecisionNode
 
+    @property
+    def depth(self) -> int:
+        """Splits on the longest path."""
+        level, depth = [self.root], 0
+        while level := [
+            branch
+            for node in level
+            if isinstance(node, Split)
+            for branch in (node.if_true, node.if_false)
+        ]:
+            depth += 1
+        return depth
+
+    def walk(self) -> Iterator[DecisionNode]:
+        """All nodes, each before its branches and ``if_true`` before ``if_false``."""
+        waiting = [self.root]
+        while waiting:
+            node = waiting.pop()
+            yield node
+            if isinstance(node, Split):
+                waiting += [node.if_false, node.if_true]
+
     def paths(self) -> Iterator[tuple[Conjunction, Leaf]]:
         """Every leaf with the conjunction of the literals that lead to it, from left to right.
 

@@ -1,0 +1,93 @@
+"""Which suggested alternate expressive subtrees (SAES) to offer with a tree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rebt_ros.algorithms.lat_occurrences import runs
+from rebt_ros.algorithms.lat_trees import gen_lat_trees
+from rebt_ros.algorithms.re_bt_espresso import build_inv_set, logic_minimizer, reduce_floats
+from rebt_ros.algorithms.rules import dt_to_rules_psa
+from rebt_ros.algorithms.suggestions import (
+    attach,
+    going_on_after_loops,
+    lat_suggestions,
+    mark,
+    psa_suggestions,
+    resolve,
+)
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import Suggestion
+from rebt_ros.decision_tree.training import TrainedTree, fit
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.options import LearnOptions
+
+#: More than a person wants to look through.
+_MOST_SUGGESTIONS = 12
+
+
+def suggest(
+    table: DemonstrationTable, trained: TrainedTree, ccp_alpha: float, options: LearnOptions
+) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
+    """What to offer: PSA nodes of the tree, and what a LAT-augmented tree tells about sequences.
+
+    Args:
+        table: The rows that were learned from.
+        trained: The decision tree of the main tree.
+        ccp_alpha: How far the LAT-augmented decision tree is pruned.
+        options: How to learn.
+
+    Returns:
+        At most twelve suggestions, the best supported first (all of them in the paper's mode), and
+        notes on what was left out.
+    """
+    psa_rules = reduce_floats(logic_minimizer(dt_to_rules_psa(trained.tree, options.delta)))
+    with_lat = (
+        trained
+        if trained.uses_last_action
+        else fit(
+            table,
+            last_action=True,
+            max_depth=options.max_depth,
+            random_state=options.random_state,
+        ).at(ccp_alpha)
+    )
+    rules = dt_to_rules_psa(with_lat.tree, options.delta)
+    inv_set = build_inv_set(rules)
+    lat_trees = gen_lat_trees(
+        reduce_floats(logic_minimizer(rules)),
+        runs(table),
+        inv_set=inv_set,
+        least_support=0 if options.is_paper else 1,
+    )
+    offered = (*psa_suggestions(psa_rules), *lat_suggestions(lat_trees.trees))
+    left_out = lat_trees.left_out.paths
+    if not options.is_paper and len(offered) > _MOST_SUGGESTIONS:
+        ranked = sorted(offered, key=lambda one: -one.support)
+        left_out += len(ranked) - _MOST_SUGGESTIONS
+        offered = tuple(ranked[:_MOST_SUGGESTIONS])
+    notes = (f"{left_out} more, less supported suggestions are left out",) if left_out else ()
+    return offered, notes
+
+
+def accept(
+    tree: nodes.Node, suggestions: tuple[Suggestion, ...], options: LearnOptions
+) -> tuple[nodes.Node, tuple[Suggestion, ...]]:
+    """The tree with what the user attaches, its PSA nodes as the user wants them.
+
+    In the paper's mode subtrees are attached as printed.  Otherwise they come before the rules,
+    which cover every state, and a Sequence goes on when a loop in it has ended.
+
+    Raises:
+        OptionError: There is no suggestion with such an id.
+    """
+    if options.attach:
+        printed = options.is_paper
+        runnable = tuple(
+            one if printed else replace(one, subtree=going_on_after_loops(one.subtree))
+            for one in suggestions
+        )
+        tree = attach(tree, runnable, options.attach, root=options.root, in_front=not printed)
+    if options.psa_choice is not None:
+        tree = resolve(tree, options.psa_choice)
+    return tree, mark(suggestions, options.attach)
