@@ -25,7 +25,7 @@ setup(
     # Lower bounds: what Ubuntu 24.04 and ROS 2 Jazzy ship, where they ship it.  ROS itself (rclpy
     # and the messages) is not named: it comes with the ROS installation, never from PyPI.
     install_requires=[
-        "jsonschema>=4.10",
+        "joblib>=1.3",
         "networkx>=2.8",
         "numpy>=1.26",
         "py_trees>=2.3",
@@ -33,7 +33,7 @@ setup(
         "rosbags>=0.11",
         "scikit-learn>=1.4",
     ],
-    extras_require={"test": ["hypothesis", "pytest"]},
+    extras_require={"test": ["hypothesis", "jsonschema>=4.10", "pytest"]},
     entry_points={
         "console_scripts": [
             f"demo = {PACKAGE}.commands.demo:main",

@@ -16,7 +16,7 @@ unset _ROS_WHEELS_BOOTSTRAP_COMPLETE
 venv=.venv
 stamp=$venv/.set-up
 ros_wheels=(ros-jazzy-rclpy ros-jazzy-common-interfaces ros-jazzy-rmw-fastrtps-cpp)
-tools=(colcon-common-extensions hypothesis mypy pytest ruff setuptools)
+tools=(colcon-common-extensions mypy ruff setuptools)
 
 fail() {
     echo "setup: $*" >&2
@@ -112,7 +112,8 @@ fi
 # The package itself is installed by colcon; only its dependencies go into the environment.
 mapfile -t dependencies < <($venv/bin/python -c '
 import setuptools, distutils.core
-print(*distutils.core.run_setup("setup.py", stop_after="init").install_requires, sep="\n")')
+package = distutils.core.run_setup("setup.py", stop_after="init")
+print(*package.install_requires, *sum(package.extras_require.values(), []), sep="\n")')
 [[ ${#dependencies[@]} -gt 0 ]] || fail "could not read the dependencies out of setup.py"
 if ! command -v cc >/dev/null && ! $venv/bin/python -c 'import pyeda' 2>/dev/null; then
     fail "pyeda is compiled when it is installed and needs a C compiler: install gcc"

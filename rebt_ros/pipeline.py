@@ -172,15 +172,12 @@ def learn_from(
     progress("judging", 0.8)
     trained = policy.fitted.at(policy.ccp_alpha)
     tree = convert(trained, options, psa=policy.psa)
-    rows = table.where(held_out)
-    forced = evaluation.agreement(evaluation.teacher_forced_choices(tree, rows), rows)
-    own = evaluation.agreement(evaluation.own_history_choices(tree, rows), rows)
+    figures = figures_of(table, held_out, trained, tree)
     if options.refit and held_out.any():
         progress("refitting", 0.9)
         trained = _refit(table, options, policy)
         tree = convert(trained, options, psa=policy.psa)
-    mismatches = np.sum(evaluation.teacher_forced_choices(tree, table) != trained.predict(table))
-    figures = Figures(int(mismatches), forced, own, int(held_out.sum()))
+        figures = replace(figures, fidelity_mismatches=_mismatches(table, trained, tree))
     learned_from = table if options.refit else shown
     suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options)
     tree, suggestions = accept(tree, suggestions, options)
@@ -188,6 +185,19 @@ def learn_from(
     progress("done", 1.0)
     return Learning(
         replace(learned, suggestions=suggestions), trained, table, held_out, policy, notes
+    )
+
+
+def figures_of(
+    table: DemonstrationTable, held_out: BoolArray, trained: TrainedTree, tree: nodes.Node
+) -> Figures:
+    """How well a behavior tree does on the rows held out, and like its decision tree on all."""
+    rows = table.where(held_out)
+    return Figures(
+        _mismatches(table, trained, tree),
+        evaluation.agreement(evaluation.teacher_forced_choices(tree, rows), rows),
+        evaluation.agreement(evaluation.own_history_choices(tree, rows), rows),
+        int(held_out.sum()),
     )
 
 
@@ -215,6 +225,11 @@ def as_learned(
             figures=figures,
         ),
     )
+
+
+def _mismatches(table: DemonstrationTable, trained: TrainedTree, tree: nodes.Node) -> int:
+    chosen = evaluation.teacher_forced_choices(tree, table)
+    return int(np.sum(chosen != trained.predict(table)))
 
 
 def _refit(table: DemonstrationTable, options: LearnOptions, policy: Policy) -> TrainedTree:

@@ -28,8 +28,9 @@ LAYERS: Final = (
     {"ros"},
     {PACKAGE},  # rebt_ros/__init__.py, the public interface
     {"offline"},
+    {"family"},
     {"pipeline", "replay"},
-    {"choosing"},
+    {"choosing", "suggesting"},
     {"selection", "options"},
     {"evaluation", "pictures", "simulation", "storage"},
     {"algorithms"},
@@ -62,9 +63,10 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 
 #: Libraries with a home: the only modules that import them.
 HOMES: Final = {
-    "jsonschema": ("rebt_ros.behavior_tree.document",),
+    "jsonschema": (),
     "joblib": ("rebt_ros.commands.bench_*",),
     "matplotlib": ("rebt_ros.pictures.*",),
+    "networkx": ("rebt_ros.algorithms.lat_*",),
     "py_trees": (
         "rebt_ros.behavior_tree.runtime",
         "rebt_ros.ros",

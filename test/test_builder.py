@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rebt_ros.demonstration.builder import (
     LARGEST_VALUE,
-    BadMessage,
+    BadMessageError,
     DemonstrationBuilder,
     Fault,
     StateTopic,
@@ -401,7 +401,7 @@ def test_a_bad_state_message_is_refused_and_changes_nothing(
     fault: Fault, topic: str, values: list[float], named: str
 ) -> None:
     spoilt, untouched = two_topics(), two_topics()
-    with pytest.raises(BadMessage) as refusal:
+    with pytest.raises(BadMessageError) as refusal:
         spoilt.observe(250 * MS, topic, values)
     _check(refusal.value, fault, named)
     _check_same(spoilt, untouched)
@@ -421,7 +421,7 @@ def test_a_bad_action_message_is_refused_and_changes_nothing(
     fault: Fault, channel: str, label: str, named: str
 ) -> None:
     spoilt, untouched = two_topics(), two_topics()
-    with pytest.raises(BadMessage) as refusal:
+    with pytest.raises(BadMessageError) as refusal:
         spoilt.act(250 * MS, channel, label)
     _check(refusal.value, fault, named)
     _check_same(spoilt, untouched)
@@ -430,7 +430,7 @@ def test_a_bad_action_message_is_refused_and_changes_nothing(
 def test_an_action_before_the_first_state_is_refused_and_names_the_silent_topic() -> None:
     builder = DemonstrationBuilder([StateTopic("state"), StateTopic("power")], ["action"], 10.0)
     builder.observe(0, "state", [1.0])
-    with pytest.raises(BadMessage) as refusal:
+    with pytest.raises(BadMessageError) as refusal:
         builder.act(1, "action", "go")
     _check(refusal.value, Fault.NO_STATE, "'power'")
     builder.observe(2, "power", [1.0])
@@ -441,7 +441,7 @@ def test_an_action_before_the_first_state_is_refused_and_names_the_silent_topic(
 @pytest.mark.parametrize("values", [[], [math.nan], [1e39], [1.0, 2.0]])
 def test_a_bad_first_message_leaves_the_topic_unheard(values: list[float]) -> None:
     builder = DemonstrationBuilder([StateTopic("power", ("volt",))], ["action"])
-    with pytest.raises(BadMessage):
+    with pytest.raises(BadMessageError):
         builder.observe(1, "power", values)
     assert builder.features is None
     builder.observe(2, "power", [1.0])
@@ -460,7 +460,7 @@ def test_labels_may_hold_any_printable_character() -> None:
     assert builder.act(2, "action", "gehe über Straße 🤖")[0].action == "gehe über Straße 🤖"
 
 
-def _check(refusal: BadMessage, fault: Fault, named: str) -> None:
+def _check(refusal: BadMessageError, fault: Fault, named: str) -> None:
     text = str(refusal)
     assert isinstance(refusal, InputError)
     assert refusal.fault is fault

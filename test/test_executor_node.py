@@ -17,7 +17,15 @@ from std_msgs.msg import String
 
 from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
-from rebt_ros.behavior_tree.nodes import Action, Condition, Node, Selector, Sequence, actions
+from rebt_ros.behavior_tree.nodes import (
+    Action,
+    Condition,
+    Node,
+    Parallel,
+    Selector,
+    Sequence,
+    actions,
+)
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import LastActionIs, Literal, Threshold
 from rebt_ros.storage.tree_file import write_tree
@@ -290,14 +298,14 @@ def test_snapshots_are_sent_when_something_changed(domain: int, peer: Peer, tmp_
         robot.until(lambda: snapshots)
         first = json.loads(snapshots[-1].data)
         assert first["nodes"] == ["SUCCESS", "SUCCESS", "SUCCESS", "SUCCESS", "INVALID"]
-        assert first["command"] == "go"
+        assert first["commands"] == {"action": "go"}
         assert first["tip"]
         before = len(snapshots)
         peer.diagnostics.clear()
         robot.until(lambda: "executor: execution" in peer.diagnostics)
         assert len(snapshots) == before
         robot.state = (7.0, 1.0)
-        robot.until(lambda: json.loads(snapshots[-1].data)["command"] == "turn")
+        robot.until(lambda: json.loads(snapshots[-1].data)["commands"]["action"] == "turn")
 
 
 def test_a_tree_from_a_table_reads_the_state_topic_in_its_order(
@@ -339,3 +347,23 @@ def test_a_wrong_start_is_one_sentence_and_exit_code_1(
         assert executor.wait() == 1
         assert sentence in executor.stderr
         assert len(executor.stderr.splitlines()) == 1
+
+
+def test_channels_are_commanded_side_by_side_each_on_a_topic_of_its_own(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    grasp, release = (Action(label, "/arm/action") for label in ("grasp", "release"))
+    drive, wait = (Action(label, "base") for label in ("drive", "wait"))
+    tree = Parallel((_where_x_is_small(grasp, release), _where_x_is_small(drive, wait)))
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}):
+        robot = Robot(peer)
+        _publish(peer, _learned(tree))
+        arm = peer.listen(String, "command/arm/action")
+        base = peer.listen(String, "command/base")
+        robot.until(lambda: arm and base, "commands on both channels")
+        assert (arm[-1].data, base[-1].data) == ("grasp", "drive")
+        robot.state = (7.0, 1.0)
+        robot.until(lambda: arm[-1].data == "release" and base[-1].data == "wait")
+        # A tree of one channel takes over, on the one topic.
+        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        robot.obeys("turn")

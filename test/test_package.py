@@ -24,7 +24,7 @@ CORE: Final = [path for path in SOURCES if path.parts[1] not in {"commands", "ro
 
 #: Import name to the name in package.xml and in setup.py; ROS packages have one name.
 DECLARED_AS: Final = {
-    "jsonschema": ("python3-jsonschema", "jsonschema"),
+    "joblib": ("python3-joblib", "joblib"),
     "networkx": ("python3-networkx", "networkx"),
     "numpy": ("python3-numpy", "numpy"),
     "py_trees": ("py_trees", "py_trees"),
@@ -32,6 +32,9 @@ DECLARED_AS: Final = {
     "rosbags": ("python3-rosbags-pip", "rosbags"),
     "sklearn": ("python3-sklearn", "scikit-learn"),
 }
+
+#: Imported only where they are installed.
+OPTIONAL: Final = {"matplotlib"}
 
 needs_installation = pytest.mark.skipif(
     INSTALLED == CHECKOUT / PACKAGE, reason="run from the checkout, not by 'make test'"
@@ -69,7 +72,7 @@ def _imported_packages() -> set[str]:
                 names.update(alias.name.split(".")[0] for alias in node.names)
             elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
                 names.add(node.module.split(".")[0])
-    return names - sys.stdlib_module_names - {PACKAGE, "__future__"}
+    return names - sys.stdlib_module_names - OPTIONAL - {PACKAGE, "__future__"}
 
 
 def _module_name(path: Path) -> str:

@@ -6,7 +6,7 @@ import pytest
 
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
 from rebt_ros.behavior_tree.nodes import Action, Condition, Selector, Sequence
-from rebt_ros.demonstration.builder import BadMessage, Fault
+from rebt_ros.demonstration.builder import BadMessageError, Fault
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import HasCategory, LastActionIs, Literal, Threshold
 from rebt_ros.ros.tree_inputs import Message, TreeInputs
@@ -65,7 +65,7 @@ def test_features_of_a_table_come_in_their_order_on_the_default_topic() -> None:
 def test_an_unusable_message_is_left_out(values: tuple[float, ...], fault: Fault) -> None:
     inputs = _inputs()
     inputs.accept("pose", Message((0.0, 0.0, 1.0), 0))
-    with pytest.raises(BadMessage) as caught:
+    with pytest.raises(BadMessageError) as caught:
         inputs.accept("pose", Message(values, 50))
     assert caught.value.fault is fault
     assert inputs.latest["pose"].received == 0

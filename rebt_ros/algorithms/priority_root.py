@@ -127,7 +127,3 @@ def _meant_by(actions: tuple[str, ...], condition: Factored) -> Factored:
         tuple(deciding(literal, actions) for literal in condition.common),
         tuple(_meant_by(actions, one) for one in condition.alternatives),
     )
-
-
-#: The name for callers that want the default: a Selector root in order of priority.
-priority_selector = reduced_tree

@@ -19,7 +19,7 @@ from typing import Any
 import joblib
 import numpy as np
 
-from rebt_ros.algorithms.priority_root import priority_selector
+from rebt_ros.algorithms.priority_root import reduced_tree
 from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
 from rebt_ros.algorithms.rules import leaf_rules
 from rebt_ros.behavior_tree import nodes
@@ -40,7 +40,7 @@ _MAX_DEPTH = 5
 
 _MODES: dict[str, Callable[[DecisionTree], nodes.Node]] = {
     "paper": lambda tree: re_bt_espresso(tree, delta=0.0),
-    "default": lambda tree: priority_selector(leaf_rules(tree, lambda leaf: (leaf.most_probable,))),
+    "default": lambda tree: reduced_tree(leaf_rules(tree, lambda leaf: (leaf.most_probable,))),
 }
 
 
@@ -87,6 +87,8 @@ class ConfigurationResult:
     rows: int
     comparisons: dict[str, list[Comparison]]
     """By mode."""
+    undecided: int
+    """Levels left out because their leaves, though several, all choose one action."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -140,10 +142,12 @@ def _bench(parsed: argparse.Namespace) -> None:
         for mode in _MODES
     }
     rows = sum(result.rows for result in results)
+    undecided = sum(result.undecided for result in results)
     settings: dict[str, Any] = {"ticks": parsed.ticks, "seed": parsed.seed, "max_depth": _MAX_DEPTH}
     work: dict[str, Any] = {
         "configurations": len(configs),
         "rows": rows,
+        "levels_of_one_action": undecided,
         "seconds": round(seconds, 1),
     }
     modes = {mode: one.encoded() for mode, one in figures.items()}
@@ -151,15 +155,11 @@ def _bench(parsed: argparse.Namespace) -> None:
     skipped = [note for config in configs for note in config.notes]
     if skipped:
         print(f"note: {len(skipped)} nodes without meaning were skipped, such as: {skipped[0]}.")
-    some = figures["default"]
-    if some.single_node_baselines:
-        print(
-            f"note: {some.single_node_baselines} of the trees, whose leaves all choose one action, "
-            "are a single node with BT-Espresso already and count as not reduced."
-        )
+    if undecided:
+        print(f"note: {undecided} levels are left out, whose leaves all choose one action.")
     print(_table(figures))
     print(
-        f"Trees compared: {some.trees}; {len(configs)} configurations, "
+        f"Trees compared: {figures['default'].trees}; {len(configs)} configurations, "
         f"{parsed.ticks} ticks each, {rows} rows; {seconds:.0f} s. Written to {parsed.out}."
     )
 
@@ -191,17 +191,22 @@ def _by_number(name: str) -> list[tuple[str, int]]:
 def compare(config: ExperimentConfig, ticks: int, seed: int) -> ConfigurationResult:
     """Simulates one configuration and compares the trees of all its pruning levels.
 
-    Levels with a single leaf are left out.
+    Levels that decide nothing are left out: those with a single leaf, and those whose leaves all
+    choose one action, of which BT-Espresso makes a single node as well.
     """
     comparisons: dict[str, list[Comparison]] = {mode: [] for mode in _MODES}
     demonstration = simulate(ExperimentRobot(config, seed), ticks).demonstration
     if not len(demonstration):
-        return ConfigurationResult(0, comparisons)
+        return ConfigurationResult(0, comparisons, 0)
     (table,) = tabulate([demonstration])
     fitted = fit(table, last_action=True, max_depth=_MAX_DEPTH)
+    undecided = 0
     for alpha in fitted.path.alphas:
         trained = fitted.at(float(alpha))
         if isinstance(trained.tree.root, Leaf):
+            continue
+        if len({leaf.most_probable for _, leaf in trained.tree.paths()}) == 1:
+            undecided += 1
             continue
         predicted = trained.predict(table)
         baseline = Size.of(bt_espresso(trained.tree))
@@ -209,7 +214,7 @@ def compare(config: ExperimentConfig, ticks: int, seed: int) -> ConfigurationRes
             tree = convert(trained.tree)
             mismatches = int(np.sum(teacher_forced_choices(tree, table) != predicted))
             comparisons[mode].append(Comparison(baseline, Size.of(tree), mismatches))
-    return ConfigurationResult(len(table), comparisons)
+    return ConfigurationResult(len(table), comparisons, undecided)
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,8 +247,6 @@ class Figures:
     """Inverters counted."""
     mismatches: int
     trees: int
-    single_node_baselines: int
-    """Trees that BT-Espresso makes a single action already: no mode can reduce them."""
 
     @classmethod
     def of(cls, comparisons: Sequence[Comparison]) -> Figures:
@@ -259,7 +262,6 @@ class Figures:
             Reductions.of([one.reduction_as_emitted for one in comparisons]),
             sum(one.mismatches for one in comparisons),
             len(comparisons),
-            sum(one.baseline.emitted == 1 for one in comparisons),
         )
 
     def encoded(self) -> dict[str, Any]:
@@ -268,7 +270,6 @@ class Figures:
             **asdict(self.reductions),
             "mismatches": self.mismatches,
             "trees": self.trees,
-            "single_node_baselines": self.single_node_baselines,
             "as_emitted": asdict(self.as_emitted),
         }
 

@@ -29,6 +29,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
@@ -111,7 +112,7 @@ def _demonstrate(plan: Plan) -> None:
 @contextlib.contextmanager
 def _processes(plan: Plan) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
     """The five nodes as processes, none of which outlives the block."""
-    commands = {
+    commands: dict[str, dict[str, Any]] = {
         "robot": {"speedup": _SPEEDUP, "rate": _RATE, "lockstep": True},
         "demonstrator": {"enabled": False},
         "recorder": {"demonstrations": plan.out / "demonstrations", "recording": False},
@@ -168,7 +169,7 @@ def _person(processes: dict[str, subprocess.Popen[bytes]]) -> Iterator[Person]:
         finally:
             person.destroy_node()
     finally:
-        rclpy.try_shutdown()
+        try_shutdown()
 
 
 class Person(Node):

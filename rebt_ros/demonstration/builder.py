@@ -38,7 +38,7 @@ class Fault(Enum):
     NO_STATE = "action before the first state"
 
 
-class BadMessage(InputError):
+class BadMessageError(InputError):
     """A message that cannot become part of a demonstration; the builder is as it was before."""
 
     def __init__(self, fault: Fault, text: str) -> None:
@@ -119,7 +119,7 @@ class DemonstrationBuilder:
             The sampled rows that were due before it; none in event mode.
 
         Raises:
-            BadMessage: It was not taken.
+            BadMessageError: It was not taken.
         """
         state = tuple(map(float, values))
         self._check_state(topic, state)
@@ -149,19 +149,21 @@ class DemonstrationBuilder:
             The rows that it completes: itself in event mode, those due before it in sampled mode.
 
         Raises:
-            BadMessage: It was not taken.
+            BadMessageError: It was not taken.
         """
         if channel not in self._history:
-            raise BadMessage(Fault.UNKNOWN_TOPIC, f"{channel!r} is not one of the action topics.")
+            raise BadMessageError(
+                Fault.UNKNOWN_TOPIC, f"{channel!r} is not one of the action topics."
+            )
         if any(not one.isprintable() for one in label):
-            raise BadMessage(
+            raise BadMessageError(
                 Fault.LABEL,
                 f"action topic {channel!r} sent the label {label!r}: "
                 "labels must consist of printable characters.",
             )
         if self._features is None:
             silent = [topic for topic in self._fields if topic not in self._latest]
-            raise BadMessage(
+            raise BadMessageError(
                 Fault.NO_STATE,
                 f"action {label!r} came before the first message on state topic {silent[0]!r}: "
                 "it is left out, because the state it belongs to is not known.",
@@ -179,25 +181,27 @@ class DemonstrationBuilder:
 
     def _check_state(self, topic: str, state: tuple[float, ...]) -> None:
         if topic not in self._fields:
-            raise BadMessage(Fault.UNKNOWN_TOPIC, f"{topic!r} is not one of the state topics.")
+            raise BadMessageError(Fault.UNKNOWN_TOPIC, f"{topic!r} is not one of the state topics.")
         expected = len(self._latest.get(topic) or self._fields[topic])
         if not state:
-            raise BadMessage(Fault.EMPTY, f"state topic {topic!r} sent a message without values.")
+            raise BadMessageError(
+                Fault.EMPTY, f"state topic {topic!r} sent a message without values."
+            )
         if expected and len(state) != expected:
-            raise BadMessage(
+            raise BadMessageError(
                 Fault.LENGTH,
                 f"state topic {topic!r} sent {len(state)} values where {expected} were expected: "
                 "every message of a topic must have the same length.",
             )
         for index, value in enumerate(state):
             if not math.isfinite(value):
-                raise BadMessage(
+                raise BadMessageError(
                     Fault.NOT_FINITE,
                     f"state topic {topic!r} sent {value} at index {index}: "
                     "replace it with a finite number before publishing.",
                 )
             if abs(value) > LARGEST_VALUE:
-                raise BadMessage(
+                raise BadMessageError(
                     Fault.TOO_LARGE,
                     f"state topic {topic!r} sent {value} at index {index}: "
                     f"values must lie within ±{LARGEST_VALUE:g}.",

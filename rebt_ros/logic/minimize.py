@@ -6,6 +6,7 @@ symbolic expressions: those would have to be built, ordered and taken apart agai
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TypeAlias
 
 from pyeda.boolalg.espresso import DTYPE, FTYPE, espresso
@@ -39,8 +40,9 @@ def minimize(dnf: Dnf, dont_care: Dnf = FALSE) -> Dnf:
         # Espresso has no cubes of zero inputs.
         return TRUE if dnf.is_true else FALSE
     vocabulary = conditions_of(Dnf(dnf.conjunctions + dont_care.conjunctions))
-    cover = [(_cube(conjunction, vocabulary), (_ON,)) for conjunction in dnf]
-    cover += [(_cube(conjunction, vocabulary), (_DONT_CARE,)) for conjunction in dont_care]
+    place = {condition: place for place, condition in enumerate(vocabulary)}
+    cover = [(_cube(conjunction, place), (_ON,)) for conjunction in dnf]
+    cover += [(_cube(conjunction, place), (_DONT_CARE,)) for conjunction in dont_care]
     _rewind()
     minimized = espresso(len(vocabulary), 1, cover, FTYPE | DTYPE)
     cubes = sorted((inputs for inputs, _ in minimized), key=_reading_order)
@@ -64,9 +66,11 @@ def _reading_order(cube: _Cube) -> list[int]:
     return [(_POSITIVE, _NEGATIVE, _ABSENT).index(value) for value in cube]
 
 
-def _cube(conjunction: Conjunction, vocabulary: tuple[Condition, ...]) -> _Cube:
-    sign = {one.condition: _POSITIVE if one.positive else _NEGATIVE for one in conjunction}
-    return tuple(sign.get(condition, _ABSENT) for condition in vocabulary)
+def _cube(conjunction: Conjunction, place: Mapping[Condition, int]) -> _Cube:
+    cube = [_ABSENT] * len(place)
+    for literal in conjunction:
+        cube[place[literal.condition]] = _POSITIVE if literal.positive else _NEGATIVE
+    return tuple(cube)
 
 
 def _conjunction(cube: _Cube, vocabulary: tuple[Condition, ...]) -> Conjunction:

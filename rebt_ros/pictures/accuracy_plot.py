@@ -172,7 +172,9 @@ def _thin_ticks(axes: Axes) -> None:
     place = axes.transData.transform
     width = place((high, 0))[0] - place((low, 0))[0]
     ticks = [one for one in axes.get_xticks() if low <= one <= high]
-    apart = [one for one in ticks if one == 0 or place((one, 0))[0] - place((low, 0))[0] > width / 20]
+    apart = [
+        one for one in ticks if one == 0 or place((one, 0))[0] - place((low, 0))[0] > width / 20
+    ]
     axes.set_xticks(apart)
 
 

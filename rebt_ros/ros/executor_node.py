@@ -23,11 +23,11 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
-from rebt_ros.demonstration.builder import BadMessage
-from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.builder import BadMessageError
+from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
 from rebt_ros.errors import DocumentError
 from rebt_ros.ros import lifetime
-from rebt_ros.ros.action_results import ActionResults
+from rebt_ros.ros.command_channels import CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.parameters import Parameters
 from rebt_ros.ros.tree_inputs import Message, TreeInputs
@@ -61,7 +61,7 @@ class ExecutorNode(Node):
         timeout = declare.number(
             "state_timeout", 0.5, "How long a state message is good for (seconds).", 0.001, 3600.0
         )()
-        self._every_tick = (
+        every_tick = (
             declare.text(
                 "publish",
                 "every_tick",
@@ -84,7 +84,9 @@ class ExecutorNode(Node):
         )()
 
         self._faults = Faults(self.get_logger())
-        self._results = ActionResults() if result_topic else None
+        self._channels = CommandChannels(self, result_topic, every_tick, self._note_result)
+        # Open before there is a tree, whose first command may then be heard.
+        self._channels.follow([DEFAULT_CHANNEL])
         self._new_inputs: Callable[[LearnedTree], TreeInputs] = partial(
             TreeInputs, default_topic=state_topic, timeout=round(timeout * 1e9)
         )
@@ -93,7 +95,6 @@ class ExecutorNode(Node):
         self._inputs: TreeInputs | None = None
         self._subscriptions_by_topic: dict[str, Subscription] = {}
         self._resting = True
-        self._sent: str | None = None
         self._ticks = 0
         self._commands = 0
         self._slowest = 0.0
@@ -105,14 +106,11 @@ class ExecutorNode(Node):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._time = self.get_clock() if simulated else steady
 
-        self._command = self.create_publisher(String, "command", 10)
         self._snapshot = self.create_publisher(String, "~/snapshot", 10)
         if tree_file:
             learned = read_tree(Path(tree_file).expanduser())
             self._run(learned, dumps(learned))
         self.create_subscription(String, "behavior_tree", self._on_document, _TREE_QOS)
-        if result_topic:
-            self.create_subscription(String, result_topic, self._on_result, 10)
         self.create_service(SetBool, "~/enable", self._enable)
         self.create_timer(1.0 / rate, self._tick, clock=self._time)
         self.create_timer(_SNAPSHOT_PERIOD, self._publish_snapshot, clock=steady)
@@ -142,11 +140,11 @@ class ExecutorNode(Node):
         Raises:
             DocumentError: This node cannot run the tree.
         """
-        channels = {action.channel for action in learned.actions}
-        if len(channels) > 1:
+        commanded = {action.channel for action in nodes.actions(learned.tree)}
+        if commanded != set(nodes.policies(learned.tree)):
             raise DocumentError(
-                f"the tree commands the channels {', '.join(sorted(channels))}: "
-                "run a tree of one channel."
+                f"the tree mixes the channels {', '.join(sorted(commanded))} in one policy: "
+                "put the policies of several channels side by side under a Parallel."
             )
         inputs = self._new_inputs(learned)
         for topic in inputs.topics:
@@ -156,13 +154,10 @@ class ExecutorNode(Node):
                 raise DocumentError(
                     f"the tree reads the state topic {topic!r}, an invalid name."
                 ) from err
-        tree = executable(learned.tree)
-        runtime = TreeRuntime(learned, self._results, tree)
         self._rest()
-        if self._runtime is not None:
-            for channel, history in self._runtime.histories.items():
-                if channel in runtime.histories:
-                    _carry_over(history, runtime.histories[channel])
+        self._channels.follow(sorted({action.channel for action in learned.actions}))
+        histories = self._runtime.histories if self._runtime else {}
+        runtime = TreeRuntime(learned, self._channels, executable(learned.tree), histories)
         known = {} if self._inputs is None else self._inputs.latest
         self._document, self._runtime, self._inputs = document, runtime, inputs
         self._subscribe(inputs)
@@ -191,16 +186,15 @@ class ExecutorNode(Node):
             return
         try:
             self._inputs.accept(topic, message)
-        except BadMessage as err:
+        except BadMessageError as err:
             self._faults.note(err.fault.value, str(err))
 
-    def _on_result(self, message: String) -> None:
-        if self._results is not None and not self._results.report(message.data):
-            self._faults.note(
-                "unknown action result",
-                f"the action result {message.data!r} is not understood: "
-                "send 'success' or 'failure', or 'label:success' or 'label:failure'.",
-            )
+    def _note_result(self, text: str) -> None:
+        self._faults.note(
+            "unknown action result",
+            f"the action result {text!r} is not understood: "
+            "send 'success' or 'failure', or 'label:success' or 'label:failure'.",
+        )
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         self._enabled = request.data
@@ -219,30 +213,20 @@ class ExecutorNode(Node):
             return
         began = time.perf_counter()
         self._resting = False
-        if self._results is not None:
-            self._results.begin_tick()
+        self._channels.begin_tick()
         actions = self._runtime.tick(self._inputs.state()).actions
         self._ticks += 1
-        if actions:
-            self._send(actions[-1].label)
+        self._commands += self._channels.send(actions)
         self._slowest = max(self._slowest, time.perf_counter() - began)
-
-    def _send(self, label: str) -> None:
-        started = self._results is not None and self._results.started
-        if self._every_tick or started or label != self._sent:
-            self._command.publish(String(data=label))
-            self._commands += 1
-        self._sent = label
 
     def _rest(self) -> None:
         """Halts the tree; what it commands next is sent, be it what it commanded last."""
         if self._resting or self._runtime is None:
             return
-        if self._results is not None:
-            self._results.begin_tick()
+        self._channels.begin_tick()
         self._runtime.halt()
         self._resting = True
-        self._sent = None
+        self._channels.rest()
 
     def _now(self) -> int:
         return int(self._time.now().nanoseconds)
@@ -270,7 +254,7 @@ class ExecutorNode(Node):
                 "condition": self._condition().split(":")[0],
                 "status": self._runtime.root.status.name,
                 "tip": tip.name if tip else "",
-                "command": self._sent,
+                "commands": self._channels.sent,
                 "nodes": self._runtime.snapshot(),
             },
             ensure_ascii=False,
@@ -305,15 +289,6 @@ class ExecutorNode(Node):
             return Report(Level.WARN, f"{condition}; {self._faults.recent}", values)
         blocked = self._enabled and condition != "running"
         return Report(Level.WARN if blocked else Level.OK, condition, values)
-
-
-def _carry_over(old: ActionHistory, new: ActionHistory) -> None:
-    """Makes a new history know what an old one knows."""
-    recent: list[str] = []
-    while (action := old.before(*recent)) is not None:
-        recent.append(action)
-    for action in reversed(recent):
-        new.take(action)
 
 
 def main(args: list[str] | None = None) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from rebt_ros.demonstration.builder import BadMessage, DemonstrationBuilder, StateTopic
+from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import RebtError
@@ -177,11 +177,11 @@ class RecordingSession:
         """Starts a demonstration that knows the present state, but none of the actions before."""
         builder = DemonstrationBuilder(self._topics, self._channels, self._sample_rate)
         for topic, (when, values, labels) in self._latest.items():
-            with contextlib.suppress(BadMessage):
+            with contextlib.suppress(BadMessageError):
                 builder.observe(when, topic, values, labels)
         if self._sample_rate is not None:
             for channel, label in self._held.items():
-                with contextlib.suppress(BadMessage):
+                with contextlib.suppress(BadMessageError):
                     builder.act(stamp, channel, label)
         self._builder = builder
 
@@ -200,7 +200,7 @@ class RecordingSession:
     def _noting_faults(self) -> Iterator[None]:
         try:
             yield
-        except BadMessage as err:
+        except BadMessageError as err:
             self._note(err.fault.value, str(err))
 
     def _write(self, rows: Sequence[Row]) -> None:

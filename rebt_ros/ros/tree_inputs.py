@@ -10,7 +10,7 @@ from typing import NamedTuple
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import StateEncoder
-from rebt_ros.demonstration.builder import BadMessage, Fault
+from rebt_ros.demonstration.builder import BadMessageError, Fault
 from rebt_ros.logic.conditions import LastActionIs
 
 
@@ -67,12 +67,12 @@ class TreeInputs:
         """Takes a message of one of the topics.
 
         Raises:
-            BadMessage: It has too few values, or one that the tree tests is not finite; it is
+            BadMessageError: It has too few values, or one that the tree tests is not finite; it is
                 left out, so that the topic goes stale unless a better one follows.
         """
         needed = self._encoder.topics[topic]
         if len(message.values) < needed:
-            raise BadMessage(
+            raise BadMessageError(
                 Fault.LENGTH,
                 f"state topic {topic!r} sent {len(message.values)} values where the tree needs "
                 f"{needed}: publish what was published when it was demonstrated.",
@@ -80,7 +80,7 @@ class TreeInputs:
         for feature in self._read.values():
             assert feature.index is not None
             if feature.topic == topic and not math.isfinite(message.values[feature.index]):
-                raise BadMessage(
+                raise BadMessageError(
                     Fault.NOT_FINITE,
                     f"state topic {topic!r} sent {message.values[feature.index]} for feature "
                     f"{feature.name!r}: replace it with a finite number before publishing.",

@@ -1,4 +1,4 @@
-"""Files that are replaced as a whole: a reader sees the old text or the new one, never a part."""
+"""Files that are replaced as a whole: a reader sees the old file or the new one, never a part."""
 
 from __future__ import annotations
 
@@ -15,11 +15,16 @@ class StorageError(RebtError):
 
 
 def write_text_atomically(path: Path, text: str) -> None:
-    """Writes a UTF-8 file and its missing parent directories.
+    """Writes a UTF-8 file and its missing parent directories; see `write_bytes_atomically`."""
+    write_bytes_atomically(path, text.encode("utf-8"))
+
+
+def write_bytes_atomically(path: Path, content: bytes) -> None:
+    """Writes a file and its missing parent directories.
 
     Args:
         path: File to create or replace; a symbolic link is followed, not replaced.
-        text: Its whole content.
+        content: All of it.
 
     Raises:
         StorageError: It could not be written; what was there before is untouched.
@@ -30,8 +35,8 @@ def write_text_atomically(path: Path, text: str) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         # In the same directory, because a file cannot be renamed across file systems.
         temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}")
-        with temporary.open("x", encoding="utf-8", newline="") as file:
-            file.write(text)
+        with temporary.open("xb") as file:
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(target)

@@ -21,7 +21,7 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from rebt_ros.arrays import FloatArray
-from rebt_ros.demonstration.builder import BadMessage, DemonstrationBuilder, Fault, StateTopic
+from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, Fault, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.fields import fields_of
 from rebt_ros.errors import InputError, RebtError
@@ -109,7 +109,7 @@ class _Feed:
         self.seen[topic] += 1
         try:
             return _pushed(self.builder, connection, stamp, data)
-        except BadMessage as err:
+        except BadMessageError as err:
             if err.fault is Fault.NO_STATE:
                 self.early += 1
                 return ()
@@ -183,7 +183,7 @@ def _pushed(
     """The rows that a message completes.
 
     Raises:
-        BadMessage: The builder refuses it.
+        BadMessageError: The builder refuses it.
         _UndecodableError: It cannot be decoded.
     """
     try:

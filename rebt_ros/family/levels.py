@@ -1,0 +1,159 @@
+"""Every pruning level as a learned tree of its own.
+
+The levels are those of the decision tree that was fitted to the rows which were not held out, so
+each is judged on rows that it was not learned from, also where the published tree was refitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.choosing import convert
+from rebt_ros.decision_tree.tree import DecisionTree
+from rebt_ros.errors import OptionError
+from rebt_ros.options import LearnOptions
+from rebt_ros.pipeline import Learning, as_learned, figures_of
+from rebt_ros.suggesting import accept
+
+#: The first, the last, the best and the chosen level are always among them.
+FEWEST_LEVELS = 4
+#: For larger decision trees the domain's don't-cares take espresso minutes and more.
+_MOST_LEAVES_WITH_DOMAIN = 40
+
+
+@dataclass(frozen=True, slots=True)
+class CrossValidated:
+    """Own-history agreement of a level in cross-validation."""
+
+    mean: float
+    standard_error: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Level:
+    """A pruning level."""
+
+    number: int
+    """Its place on the pruning path: 0 is the tree as it was fitted."""
+    ccp_alpha: float
+    decision_tree: DecisionTree
+    leaves: int
+    """Of the decision tree."""
+    learned: LearnedTree
+    cross_validated: CrossValidated | None
+    """None where there were too few rows, or where the level was not run."""
+    chosen: bool
+    best: bool
+    reduced: bool
+    """Whether all reductions were made that were asked for."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Family:
+    """What is known of all levels before their trees are made."""
+
+    learning: Learning
+    options: LearnOptions
+
+    @property
+    def ccp_alphas(self) -> FloatArray:
+        """Ascending, shape (levels,)."""
+        return self.learning.policy.fitted.path.alphas
+
+    @property
+    def leaves(self) -> IntArray:
+        """Leaves of the decision tree at each level, shape (levels,)."""
+        return self.learning.policy.fitted.path.leaf_counts()
+
+    @property
+    def chosen(self) -> int:
+        """The level that was chosen, or that the ``ccp_alpha`` asked for comes to."""
+        return _level_of(self.ccp_alphas, self.learning.policy.ccp_alpha)
+
+    @property
+    def best(self) -> int | None:
+        """The level with the highest agreement in cross-validation; None where there was none."""
+        judged = self.learning.policy.levels
+        return None if judged is None else _level_of(self.ccp_alphas, judged.ccp_alphas[judged.best])
+
+    def selected(self, most: int) -> tuple[int, ...]:
+        """At most so many levels, evenly spread, with the first, last, best and chosen ones.
+
+        Raises:
+            OptionError: Fewer than these four are asked for.
+        """
+        check_most_levels(most)
+        last = len(self.ccp_alphas) - 1
+        fixed = {0, last, self.chosen} | ({self.best} if self.best is not None else set())
+        spread = set(np.linspace(0, last, min(most, last + 1)).round().astype(int).tolist())
+        for level in sorted(fixed - spread):
+            # Takes the place of a neighbour.
+            spread.remove(min(spread - fixed, key=lambda one, to=level: (abs(one - to), one)))
+            spread.add(level)
+        return tuple(sorted(spread))
+
+    def level(self, number: int) -> Level:
+        """Makes the trees of a level."""
+        learning, ccp_alpha = self.learning, float(self.ccp_alphas[number])
+        trained = learning.policy.fitted.at(ccp_alpha)
+        leaves, chosen = int(self.leaves[number]), number == self.chosen
+        # The chosen one was made before, so it can be made again.
+        within = self.options if chosen else _within_reason(self.options, leaves)
+        # Suggestions belong to the published tree.
+        tree, _ = accept(
+            convert(trained, within, psa=learning.policy.psa), (), replace(self.options, attach=())
+        )
+        figures = figures_of(learning.table, learning.held_out, trained, tree)
+        return Level(
+            number,
+            ccp_alpha,
+            trained.tree,
+            leaves,
+            as_learned(learning.table, trained, tree, ccp_alpha, figures, self.options),
+            self._cross_validated(ccp_alpha),
+            chosen,
+            number == self.best,
+            within == self.options,
+        )
+
+    def levels(self, numbers: tuple[int, ...]) -> Iterator[Level]:
+        """Makes the trees of these levels, one after the other."""
+        return (self.level(number) for number in numbers)
+
+    def _cross_validated(self, ccp_alpha: float) -> CrossValidated | None:
+        judged = self.learning.policy.levels
+        if judged is None:
+            return None
+        for place in np.flatnonzero(judged.ccp_alphas == ccp_alpha):
+            mean, error = judged.means[place], judged.standard_errors[place]
+            return CrossValidated(float(mean), float(error))
+        return None
+
+
+def check_most_levels(most: int) -> None:
+    """Checks how many levels are asked for, before any work is done.
+
+    Raises:
+        OptionError: There are too few.
+    """
+    if most < FEWEST_LEVELS:
+        raise OptionError(
+            f"most_levels must be at least {FEWEST_LEVELS}, not {most}, "
+            "as the first, last, best and chosen level are always written."
+        )
+
+
+def _level_of(ccp_alphas: FloatArray, ccp_alpha: float) -> int:
+    """A level stands for all alphas from its own up to the next one's."""
+    return int(np.searchsorted(ccp_alphas, ccp_alpha, side="right")) - 1
+
+
+def _within_reason(options: LearnOptions, leaves: int) -> LearnOptions:
+    if options.reductions is None or leaves <= _MOST_LEAVES_WITH_DOMAIN:
+        return options
+    return replace(options, reductions=replace(options.reductions, domain=False))

@@ -1,0 +1,151 @@
+"""The executor's channels: on each, commands go out and results of actions come in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from py_trees.common import Status
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node
+from rclpy.validate_topic_name import validate_topic_name
+from std_msgs.msg import String
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.errors import DocumentError
+from rebt_ros.ros.action_results import ActionResults
+
+
+def topic_of(base: str, channel: str, channels: Sequence[str]) -> str:
+    """The topic of a channel: `base`, or a topic below it where there are several channels.
+
+    Raises:
+        DocumentError: A channel's name cannot be part of a topic's name.
+    """
+    if len(channels) < 2:
+        return base
+    topic = f"{base}/{channel.strip('/')}"
+    try:
+        validate_topic_name(topic)
+    except InvalidTopicNameException as err:
+        raise DocumentError(f"the tree has the channel {channel!r}, an invalid name.") from err
+    return topic
+
+
+class CommandChannels:
+    """Carries out the actions of a tree, on a topic for each of its channels.
+
+    Args:
+        node: What publishes and subscribes.
+        result_topic: Where the robot says how actions ended; empty if they are done at once.
+        every_tick: Whether a command is sent at every tick, or only when it changes.
+        not_understood: Told of results that are no results.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        result_topic: str,
+        every_tick: bool,
+        not_understood: Callable[[str], None],
+    ) -> None:
+        self._node = node
+        self._result_topic = result_topic
+        self._every_tick = every_tick
+        self._not_understood = not_understood
+        self._channels: dict[str, _Channel] = {}
+
+    def follow(self, channels: Sequence[str]) -> None:
+        """Makes these the channels.
+
+        Raises:
+            DocumentError: A channel's name cannot be part of a topic's name; nothing has changed.
+        """
+        topics = {
+            channel: (
+                topic_of("command", channel, channels),
+                topic_of(self._result_topic, channel, channels) if self._result_topic else "",
+            )
+            for channel in channels
+        }
+        # A topic that stays keeps its publisher, so that nobody has to discover it anew.
+        open_now = {channel.topics: channel for channel in self._channels.values()}
+        self._channels = {
+            name: (
+                open_now.pop(pair)
+                if pair in open_now
+                else _Channel(self._node, *pair, self._not_understood)
+            )
+            for name, pair in topics.items()
+        }
+        for channel in open_now.values():
+            channel.close()
+
+    @property
+    def sent(self) -> dict[str, str | None]:
+        """The latest command of each channel; None where it rests."""
+        return {name: channel.sent for name, channel in self._channels.items()}
+
+    def begin_tick(self) -> None:
+        """Must be called before each tick of the tree."""
+        for channel in self._channels.values():
+            if channel.results:
+                channel.results.begin_tick()
+
+    def send(self, actions: Sequence[nodes.Action]) -> int:
+        """Sends, on each channel, the last action that was ticked.
+
+        Returns:
+            How many commands went out.
+        """
+        latest = {action.channel: action.label for action in actions}
+        return sum(
+            self._channels[name].send(label, self._every_tick) for name, label in latest.items()
+        )
+
+    def rest(self) -> None:
+        """What is commanded next is sent, be it what was commanded last."""
+        for channel in self._channels.values():
+            channel.sent = None
+
+    def update(self, action: nodes.Action) -> Status:
+        """How it goes with an action: done at once, or as the robot says."""
+        results = self._channels[action.channel].results
+        return results.update(action) if results else Status.SUCCESS
+
+    def halt(self, action: nodes.Action) -> None:
+        """An action is interrupted."""
+        channel = self._channels.get(action.channel)
+        if channel and channel.results:
+            channel.results.halt(action)
+
+
+class _Channel:
+    def __init__(
+        self, node: Node, commands: str, results: str, not_understood: Callable[[str], None]
+    ) -> None:
+        self.topics = (commands, results)
+        self.results = ActionResults() if results else None
+        self.sent: str | None = None
+        self._node = node
+        self._not_understood = not_understood
+        self._publisher = node.create_publisher(String, commands, 10)
+        self._subscription = (
+            node.create_subscription(String, results, self._on_result, 10) if results else None
+        )
+
+    def send(self, label: str, every_tick: bool) -> bool:
+        started = self.results is not None and self.results.started
+        due = every_tick or started or label != self.sent
+        if due:
+            self._publisher.publish(String(data=label))
+        self.sent = label
+        return due
+
+    def close(self) -> None:
+        self._node.destroy_publisher(self._publisher)
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+
+    def _on_result(self, message: String) -> None:
+        if self.results is not None and not self.results.report(message.data):
+            self._not_understood(message.data)

@@ -1,0 +1,159 @@
+"""The commands as a user runs them: what they write, print, and how they refuse."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rebt_ros.storage.tree_file import read_tree
+
+#: Runs a module as a program where nothing of ROS can be imported.
+WITHOUT_ROS = """
+import runpy, sys
+for name in ("rclpy", "std_msgs", "std_srvs", "diagnostic_msgs", "ament_index_python"):
+    sys.modules[name] = None
+module, *sys.argv[1:] = sys.argv[1:]
+runpy.run_module(module, run_name="__main__", alter_sys=True)
+"""
+
+TABLE = "front,docked,action\n" + "".join(
+    f"{front / 10},{docked},{'charge' if docked else 'turn' if front < 5 else 'go'}\n"
+    for docked in (0, 1)
+    for front in range(10)
+    for _ in range(4)
+)
+
+
+def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = ["learn", "replay"].index(str(arguments[0]))
+    module = f"rebt_ros.commands.{('learn', 'replay')[command]}"
+    return subprocess.run(
+        [sys.executable, "-c", WITHOUT_ROS, module, *map(str, arguments[1:])],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("tables") / "table.csv"
+    path.write_text(TABLE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def learned(table: Path) -> Path:
+    out = table.parent / "learned"
+    done = run("learn", table, "--out", out, "--test-fraction", "0")
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+def test_learn_writes_tree_summary_and_pictures_without_ros(learned: Path) -> None:
+    assert {"tree.json", "summary.json", "tree.svg", "tree.dot", "tree.txt"} <= {
+        path.name for path in learned.iterdir()
+    }
+    summary = json.loads((learned / "summary.json").read_text())
+    assert summary["rows"] == 80
+    assert summary["demonstrations"] == 1
+    assert summary["features"] == ["front", "docked"]
+    assert summary["actions"] == ["charge", "go", "turn"]
+    assert summary["fidelity_mismatches"] == 0
+    assert summary["nodes"] == 8
+    assert {"ccp_alpha", "teacher_forced_agreement", "own_history_agreement"} <= set(summary)
+    assert {action.label for action in read_tree(learned / "tree.json").actions} == {
+        "charge",
+        "go",
+        "turn",
+    }
+
+
+def test_learn_prints_the_tree_as_a_person_would_say_it(table: Path, tmp_path: Path) -> None:
+    done = run("learn", table, "--out", tmp_path)
+    assert done.returncode == 0
+    for line in ("--> docked", "--> charge", "front", "Learned a behavior tree", "own history"):
+        assert line in done.stdout
+    assert "\033[" not in done.stdout
+
+
+def test_learn_follows_its_options(table: Path, tmp_path: Path) -> None:
+    done = run(
+        "learn", table, "--out", tmp_path, "--root", "parallel", "--max-depth", "1", "--refit",
+        "--last-action", "never", "--ccp-alpha", "0", "--delta", "0.1", "--test-fraction", "0.5",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["root"] == "parallel"
+    assert summary["decision_tree_leaves"] == 2
+    assert summary["delta"] == 0.1
+    assert summary["held_out_rows"] == 40
+    assert summary["refit"] is True
+
+
+def test_replay_shows_agreement_confusion_and_disagreements(learned: Path, table: Path) -> None:
+    other = table.parent / "other.csv"
+    other.write_text(TABLE.replace("0.2,0,turn", "0.2,0,go", 1))
+    done = run("replay", learned / "tree.json", other)
+    assert done.returncode == 0, done.stderr
+    assert "98.75%" in done.stdout
+    lines = done.stdout.splitlines()
+    header = next(line for line in lines if line.startswith("shown"))
+    go = next(line for line in lines if line.startswith("go "))
+    assert header.split()[3:] == ["charge", "go", "turn"]
+    assert go.split()[1:] == ["·", "20", "1"]
+    assert len(go) == len(header)
+    first = next(line for line in lines if line.startswith("other"))
+    assert first.split()[1:] == ["8", "go", "turn"]
+
+
+def test_replay_refuses_a_recording_without_the_features_of_the_tree(
+    learned: Path, tmp_path: Path
+) -> None:
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("speed,action\n1.0,go\n2.0,turn\n")
+    done = run("replay", learned / "tree.json", foreign)
+    assert done.returncode == 1
+    assert "'docked'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("learn", "nowhere.csv"), "nowhere.csv does not exist"),
+        (("learn", "TABLE", "--label", "nix"), "'nix'"),
+        (("learn", "TABLE", "--delta", "2"), "delta must lie between 0 and 1"),
+        (("learn", "TABLE", "--max-depth", "0"), "max_depth must be at least 1"),
+        (("learn", "TABLE", "--root", "sequence"), "Sequence root"),
+        (("learn", "TABLE", "--attach", "psa-9"), "'psa-9'"),
+        (("learn", "TABLE", "--binary", "front"), "'front' cannot be binary"),
+        (("learn", "TABLE", "--categorical", "wheel"), "no feature 'wheel'"),
+        (("replay", "TABLE", "TABLE"), "not JSON"),
+        (("replay", "nowhere.json", "TABLE"), "nowhere.json"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_sentence_with_exit_code_1(
+    table: Path, tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    given = [table if one == "TABLE" else one for one in arguments]
+    extra = ["--out", tmp_path / "out"] if arguments[0] == "learn" else []
+    done = run(*given, *extra)
+    assert done.returncode == 1
+    assert said in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_was_learned_before_stays_when_learning_fails(learned: Path, table: Path) -> None:
+    before = (learned / "tree.json").read_bytes()
+    one_action = table.parent / "one.csv"
+    one_action.write_text("x,action\n1,go\n2,go\n")
+    done = run("learn", one_action, "--out", learned)
+    assert done.returncode == 1
+    assert "one action only" in done.stderr
+    assert (learned / "tree.json").read_bytes() == before
