@@ -33,7 +33,10 @@ setup(
         "rosbags>=0.11",
         "scikit-learn>=1.4",
     ],
-    extras_require={"test": ["hypothesis", "jsonschema>=4.10", "pytest"]},
+    extras_require={
+        "pictures": ["matplotlib>=3.6"],
+        "test": ["hypothesis", "jsonschema>=4.10", "pytest"],
+    },
     entry_points={
         "console_scripts": [
             f"demo = {PACKAGE}.commands.demo:main",

@@ -6,18 +6,24 @@ import importlib.metadata
 import json
 import platform
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rebt_ros import pipeline
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.dot import render_dot
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.family.files import (
+    channel_directories,
+    clear_family,
+    write_behavior_tree,
+    write_decision_tree,
+    write_family,
+)
+from rebt_ros.family.levels import Family, check_most_levels
 from rebt_ros.options import LearnOptions
 from rebt_ros.pipeline import Learning, Progress
 from rebt_ros.replay import Replay
@@ -25,10 +31,12 @@ from rebt_ros.replay import replay as replay_demonstrations
 from rebt_ros.selection import JudgedLevels
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.inputs import InputOptions, load
-from rebt_ros.storage.tree_file import read_tree, write_tree
+from rebt_ros.storage.tree_file import read_tree
 
 #: Packages whose versions can change a result.
 _DECIDING_PACKAGES = ("numpy", "scikit-learn", "pyeda", "py_trees")
+#: Of all the work, where pruning levels are written.
+_LEARNING_SHARE = 0.3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -50,32 +58,46 @@ def learn(
     options: LearnOptions | None = None,
     reading: InputOptions | None = None,
     declared: Mapping[str, FeatureKind] | None = None,
+    levels: bool = False,
+    most_levels: int = 100,
     progress: Progress = lambda stage, share: None,
 ) -> OfflineLearning:
     """Learns a behavior tree from bags, recordings and CSV tables.
 
     Args:
         inputs: Each one or more demonstrations, oldest first.
-        out: Directory to write to: tree.json, summary.json, tree.svg, tree.dot and tree.txt.
+        out: Directory to write to: tree.json, summary.json, tree.txt, pictures of the behavior
+            tree and of its decision tree.  With several channels the decision trees are in
+            channels/NAME/.
         options: How to learn.
         reading: How to read the inputs, such as which column of a CSV table is the action.
         declared: Kinds of features by name, where they should not be detected.
+        levels: Whether all pruning levels are written as well, to levels/ beside each decision
+            tree.
+        most_levels: If so, this many at most.
         progress: Told what is being done and which share of the work is behind.
 
     Raises:
         RebtError: An input cannot be used or an option makes no sense; nothing was written.
     """
     options = options or LearnOptions()
+    if levels:
+        check_most_levels(most_levels)
     progress("reading", 0.0)
     loaded = load([Path(one) for one in inputs], reading or InputOptions())
     tables = tabulate(loaded.demonstrations, declared)
-    learnings = pipeline.learn_channels(tables, options, progress)
+    learning = _part(progress, 0.0, _LEARNING_SHARE) if levels else progress
+    learnings = pipeline.learn_channels(tables, options, learning)
     doubts = (doubt for table in tables for doubt in _doubts(table))
     further = (note for learning in learnings for note in learning.notes)
     notes = (*loaded.notes, *doubts, *further)
     result = OfflineLearning(pipeline.side_by_side(learnings), learnings, notes)
     if out is not None:
-        _write(Path(out), result, [str(one) for one in inputs], options)
+        writing = _part(progress, _LEARNING_SHARE, 1.0)
+        missing = _write_trees(Path(out), result, options, most_levels if levels else 0, writing)
+        result = replace(result, notes=(*notes, *missing))
+        _write_summary(Path(out), result, [str(one) for one in inputs], options)
+    progress("done", 1.0)
     return result
 
 
@@ -111,14 +133,36 @@ def _doubts(table: DemonstrationTable) -> Iterator[str]:
         )
 
 
-def _write(
+def _part(progress: Progress, start: float, end: float) -> Progress:
+    """Progress of a part of the work."""
+    return lambda stage, share: progress(stage, start + share * (end - start))
+
+
+def _write_trees(
+    directory: Path,
+    result: OfflineLearning,
+    options: LearnOptions,
+    most_levels: int,
+    progress: Progress,
+) -> tuple[str, ...]:
+    """Writes all but the summary; returns notes, each once."""
+    notes = write_behavior_tree(directory, result.learned)
+    write_text_atomically(directory / "tree.txt", render_text(result.learned))
+    for place, (name, learning) in enumerate(channel_directories(result.learnings)):
+        beside = directory / name
+        notes += write_decision_tree(beside, learning.decision_tree.tree)
+        if most_levels:
+            count = len(result.learnings)
+            of_channel = _part(progress, place / count, (place + 1) / count)
+            notes += write_family(beside, Family(learning, options), most_levels, of_channel)
+        else:
+            clear_family(beside)
+    return tuple(dict.fromkeys(notes))
+
+
+def _write_summary(
     directory: Path, result: OfflineLearning, inputs: Sequence[str], options: LearnOptions
 ) -> None:
-    learned = result.learned
-    write_tree(directory / "tree.json", learned)
-    write_text_atomically(directory / "tree.svg", render_svg(learned))
-    write_text_atomically(directory / "tree.dot", render_dot(learned))
-    write_text_atomically(directory / "tree.txt", render_text(learned))
     summary = summarize(result) | {
         "inputs": list(inputs),
         "notes": list(result.notes),

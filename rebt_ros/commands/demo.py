@@ -17,7 +17,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -66,11 +66,11 @@ class Plan:
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="demo", description=__doc__.splitlines()[0])
-    parser.add_argument("--demonstrations", type=int, default=10, help="default: %(default)s")
+    parser.add_argument("--demonstrations", type=int, default=8, help="default: %(default)s")
     parser.add_argument(
         "--trials",
         type=int,
-        default=8,
+        default=6,
         help="runs of each driver to compare (default: %(default)s)",
     )
     parser.add_argument(
@@ -291,7 +291,7 @@ def _report(
     tree = loads(document)
     write_text_atomically(plan.out / "learned" / "tree.svg", render_svg(tree))
     print(f"\nThe learned tree ({nodes.size(tree.tree)} nodes):\n")
-    print(render_text(tree, color=use_color()))
+    print(render_text(replace(tree, suggestions=()), color=use_color()))
     rows = [
         ("", "goal reached", "mean time", "bumps"),
         ("demonstrator, shown starts", *_figures(shown)),

@@ -46,6 +46,19 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, default=Path("learned"), metavar="DIR", help="default: %(default)s"
     )
     defaults = LearnOptions()
+    parser.add_argument(
+        "--levels",
+        action="store_true",
+        help="also write every pruning level, from the unpruned tree to a single action, to "
+        "DIR/levels, and agreement over ccp_alpha as a plot",
+    )
+    parser.add_argument(
+        "--most-levels",
+        type=int,
+        default=100,
+        metavar="N",
+        help="with --levels: so many levels at most, evenly spread (default: %(default)s)",
+    )
     learning = parser.add_argument_group("learning (paper, section III)")
     learning.add_argument(
         "--paper",
@@ -176,6 +189,8 @@ def _learn(parsed: argparse.Namespace) -> None:
             options=_options(parsed),
             reading=input_options(parsed),
             declared=_declared(parsed),
+            levels=parsed.levels,
+            most_levels=parsed.most_levels,
             progress=progress,
         )
     finally:
@@ -193,7 +208,8 @@ def _learn(parsed: argparse.Namespace) -> None:
             print(f"  - {channel}{reason}")
     if result.learned.suggestions:
         print("\n".join(_suggestions(result.learned)))
-    print(f"Written to {parsed.out}: tree.json, summary.json, tree.svg, tree.dot, tree.txt.")
+    files = "tree.json, summary.json and pictures of the tree and of its decision tree"
+    print(f"Written to {parsed.out}: {files}{', levels/' if parsed.levels else ''}.")
 
 
 def _declared(parsed: argparse.Namespace) -> dict[str, FeatureKind]:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +26,14 @@ from rebt_ros.pictures.decision_tree_dot import render_decision_tree_dot
 from rebt_ros.pictures.decision_tree_svg import render_decision_tree_svg
 from rebt_ros.pictures.errors import PictureError
 from rebt_ros.pictures.tree_png import render_decision_tree_png, render_png
-from rebt_ros.pipeline import Progress
+from rebt_ros.pipeline import Learning, Progress
 from rebt_ros.storage.atomic import write_bytes_atomically, write_text_atomically
 from rebt_ros.storage.tree_file import write_tree
 
 _LEVELS, _SUMMARY = "levels", "summary.json"
 _PLOT = "accuracy_vs_alpha"
+#: Families that take more room say so.
+_MENTIONED_MEGABYTES = 50
 _LEVEL_FILES = (
     "tree.json",
     "tree.svg",
@@ -50,7 +54,7 @@ def write_behavior_tree(directory: Path, learned: LearnedTree) -> list[str]:
     write_tree(directory / "tree.json", learned)
     write_text_atomically(directory / "tree.svg", render_svg(learned))
     write_text_atomically(directory / "tree.dot", render_dot(learned))
-    return _write_picture(directory / "tree.png", lambda: render_png(learned))
+    return _write_picture(directory / "tree.png", partial(render_png, learned))
 
 
 def write_decision_tree(directory: Path, tree: DecisionTree) -> list[str]:
@@ -62,7 +66,22 @@ def write_decision_tree(directory: Path, tree: DecisionTree) -> list[str]:
     path = directory / "decision_tree"
     write_text_atomically(path.with_suffix(".svg"), render_decision_tree_svg(tree))
     write_text_atomically(path.with_suffix(".dot"), render_decision_tree_dot(tree))
-    return _write_picture(path.with_suffix(".png"), lambda: render_decision_tree_png(tree))
+    return _write_picture(path.with_suffix(".png"), partial(render_decision_tree_png, tree))
+
+
+def channel_directories(learnings: Sequence[Learning]) -> Iterator[tuple[Path, Learning]]:
+    """Where the files of each channel's policy go, relative to those of the whole tree."""
+    if len(learnings) == 1:
+        yield Path(), learnings[0]
+        return
+    taken: set[str] = set()
+    for learning in learnings:
+        # Channels are topics, whose slashes would make directories of their own.
+        name = re.sub("[^A-Za-z0-9_-]+", "_", learning.table.channel).strip("_") or "channel"
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        yield Path("channels", name), learning
 
 
 def write_family(directory: Path, family: Family, most: int, progress: Progress) -> list[str]:
@@ -102,6 +121,9 @@ def write_family(directory: Path, family: Family, most: int, progress: Progress)
     text = json.dumps(entries, indent=2, ensure_ascii=False)
     write_text_atomically(directory / _LEVELS / _SUMMARY, text + "\n")
     notes += _write_plot(directory, family)
+    megabytes = _size(directory / _LEVELS) / 1e6
+    if megabytes > _MENTIONED_MEGABYTES:
+        notes.append(f"the levels take {megabytes:.0f} MB; a smaller --most-levels takes less")
     return list(dict.fromkeys(notes))
 
 
@@ -118,6 +140,10 @@ def clear_family(directory: Path) -> None:
                 _remove_if_empty(level)
         (levels / _SUMMARY).unlink(missing_ok=True)
         _remove_if_empty(levels)
+
+
+def _size(directory: Path) -> int:
+    return sum(path.stat().st_size for path in directory.rglob("*") if path.is_file())
 
 
 def _remove_if_empty(directory: Path) -> None:
@@ -172,7 +198,7 @@ def _write_plot(directory: Path, family: Family) -> list[str]:
     notes: list[str] = []
     for form in PlotFormat:
         path = directory / f"{_PLOT}.{form.value}"
-        notes += _write_picture(path, lambda form=form: render_accuracy_plot(curve, form))
+        notes += _write_picture(path, partial(render_accuracy_plot, curve, form))
     return notes
 
 

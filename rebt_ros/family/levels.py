@@ -6,7 +6,6 @@ each is judged on rows that it was not learned from, also where the published tr
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -79,7 +78,9 @@ class Family:
     def best(self) -> int | None:
         """The level with the highest agreement in cross-validation; None where there was none."""
         judged = self.learning.policy.levels
-        return None if judged is None else _level_of(self.ccp_alphas, judged.ccp_alphas[judged.best])
+        if judged is None:
+            return None
+        return _level_of(self.ccp_alphas, float(judged.ccp_alphas[judged.best]))
 
     def selected(self, most: int) -> tuple[int, ...]:
         """At most so many levels, evenly spread, with the first, last, best and chosen ones.
@@ -92,8 +93,7 @@ class Family:
         fixed = {0, last, self.chosen} | ({self.best} if self.best is not None else set())
         spread = set(np.linspace(0, last, min(most, last + 1)).round().astype(int).tolist())
         for level in sorted(fixed - spread):
-            # Takes the place of a neighbour.
-            spread.remove(min(spread - fixed, key=lambda one, to=level: (abs(one - to), one)))
+            spread.remove(_nearest(spread - fixed, level))
             spread.add(level)
         return tuple(sorted(spread))
 
@@ -121,10 +121,6 @@ class Family:
             within == self.options,
         )
 
-    def levels(self, numbers: tuple[int, ...]) -> Iterator[Level]:
-        """Makes the trees of these levels, one after the other."""
-        return (self.level(number) for number in numbers)
-
     def _cross_validated(self, ccp_alpha: float) -> CrossValidated | None:
         judged = self.learning.policy.levels
         if judged is None:
@@ -146,6 +142,10 @@ def check_most_levels(most: int) -> None:
             f"most_levels must be at least {FEWEST_LEVELS}, not {most}, "
             "as the first, last, best and chosen level are always written."
         )
+
+
+def _nearest(levels: set[int], to: int) -> int:
+    return min(levels, key=lambda level: (abs(level - to), level))
 
 
 def _level_of(ccp_alphas: FloatArray, ccp_alpha: float) -> int:

@@ -123,11 +123,13 @@ def _draw_choice(axes: Axes, curve: AccuracyCurve) -> None:
         curve.ccp_alphas[best],
         curve.means[best],
         "o",
-        markersize=9,
+        markersize=10,
         markerfacecolor="#ffffff",
         markeredgecolor=_BEST,
         markeredgewidth=2,
         linestyle="none",
+        clip_on=False,
+        zorder=5,
         label=f"best: {_of(curve, best)}",
     )
     # A level stands for all alphas up to the next one.
@@ -137,16 +139,18 @@ def _draw_choice(axes: Axes, curve: AccuracyCurve) -> None:
         curve.chosen,
         curve.means[level],
         "D",
-        markersize=7.5,
+        markersize=6.5,
         color=_CHOSEN,
         linestyle="none",
+        clip_on=False,
+        zorder=6,
         label=f"chosen: {_of(curve, level)}",
     )
 
 
 def _label(axes: Axes, curve: AccuracyCurve) -> None:
     axes.set_xlabel("ccp_alpha: larger values prune more", color=INK)
-    axes.set_ylabel("own-history agreement in cross-validation", color=INK)
+    axes.set_ylabel("agreement in cross-validation", color=INK)
     axes.set_title("Agreement over ccp_alpha", loc="left", color=INK, fontweight="bold", pad=14)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value * 100:.4g}%")
     positive = curve.ccp_alphas[curve.ccp_alphas > 0]
@@ -162,7 +166,7 @@ def _label(axes: Axes, curve: AccuracyCurve) -> None:
     axes.minorticks_off()
     _bare(axes)
     axes.legend(
-        loc="lower left", frameon=True, facecolor="#ffffff", edgecolor="none", framealpha=0.85
+        loc="lower left", frameon=True, facecolor="#ffffff", edgecolor="none", framealpha=0.9
     )
 
 

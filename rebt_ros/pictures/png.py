@@ -6,6 +6,7 @@ This needs no display, browser or system package.
 from __future__ import annotations
 
 import io
+import math
 import re
 import warnings
 from collections.abc import Iterator
@@ -24,7 +25,7 @@ _SCALE = 2.0
 #: Scaled down further, letters could not be read.
 _LEAST_SCALE = 0.75
 #: Of one file, and of one side of it.
-_MOST_PIXELS, _LONGEST_SIDE = 40e6, 32_000
+_MOST_PIXELS, _LONGEST_SIDE = 20e6, 16_000
 _FONT = "DejaVu Sans"
 _POINTS_PER_INCH = 72.0
 #: How far the control points of a quarter circle lie from its ends, in radii.
@@ -58,7 +59,9 @@ def render_page_png(page: Page) -> bytes:
         for depth, mark in enumerate(page.drawing.marks):
             _draw(axes, mark, depth)
         file = io.BytesIO()
-        figure.savefig(file, format="png", dpi="figure", metadata={"Title": page.title})
+        # Drawings are compressed well without much effort.
+        quick = {"compress_level": 2}
+        figure.savefig(file, format="png", dpi="figure", pil_kwargs=quick)
     return file.getvalue()
 
 
@@ -87,13 +90,12 @@ def matplotlib_defaults() -> Iterator[None]:
 def _scale(drawing: Drawing) -> float:
     scale = min(
         _SCALE,
-        (_MOST_PIXELS / (drawing.width * drawing.height)) ** 0.5,
+        math.sqrt(_MOST_PIXELS / (drawing.width * drawing.height)),
         _LONGEST_SIDE / max(drawing.width, drawing.height),
     )
     if scale < _LEAST_SCALE:
         raise PictureTooLargeError(
-            f"a picture of {drawing.width:.0f} x {drawing.height:.0f} pixels is too large for a "
-            "PNG file: look at the SVG file."
+            "a picture too large for a PNG file was not made as one: look at the SVG file."
         )
     return scale
 
@@ -107,7 +109,7 @@ def _draw(axes: Axes, mark: Mark, depth: int) -> None:
 
             xs, ys = zip(*points, strict=True)
             line = Line2D(xs, ys, linewidth=2.0, color=LINE, solid_capstyle="butt", zorder=depth)
-            axes.add_line(line)
+            axes.add_artist(line)
         case Panel():
             _draw_panel(axes, mark, depth)
         case Node(panel=panel, texts=texts):
@@ -136,7 +138,7 @@ def _draw_text(axes: Axes, text: Text, depth: int) -> None:
 def _draw_panel(axes: Axes, panel: Panel, depth: int) -> None:
     from matplotlib.patches import PathPatch
 
-    axes.add_patch(
+    axes.add_artist(
         PathPatch(
             _outline(panel),
             facecolor=panel.fill,
