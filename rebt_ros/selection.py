@@ -19,8 +19,9 @@ from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
 from rebt_ros.demonstration.table import DemonstrationTable
 
 _FOLDS = 5
-#: A LAT-augmented tree has to be run through the rows to be judged: so many levels are.
-_MOST_LEVELS_RUN = 12
+#: A LAT-augmented tree has to be converted and run through the rows to be judged: so many levels
+#: are, and no larger trees than that, which nobody could read anyway.
+_MOST_LEVELS_RUN, _MOST_LEAVES_RUN = 12, 64
 
 #: Makes a behavior tree of a pruned decision tree.
 Convert = Callable[[TrainedTree], nodes.Node]
@@ -108,8 +109,9 @@ class CrossValidation:
         if not self.fitted.uses_last_action:
             # Without LAT a tree's own history makes no difference.
             return self.teacher_forced()
-        levels = len(self.fitted.path)
-        run = np.unique(np.linspace(0, levels - 1, min(levels, _MOST_LEVELS_RUN)).astype(int))
+        small = np.flatnonzero(self.fitted.path.leaf_counts() <= _MOST_LEAVES_RUN)
+        even = np.linspace(0, len(small) - 1, min(len(small), _MOST_LEVELS_RUN)).astype(int)
+        run = small[np.unique(even)]
         scores = [
             [
                 _agreement_run(convert(of_fold.at(alpha)), rows)

@@ -20,11 +20,15 @@ from rebt_ros.algorithms.rules import FactoredRule, Rule
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.logic.conditions import deciding
-from rebt_ros.logic.dnf import FALSE, TRUE, Dnf, conditions_of
-from rebt_ros.logic.domain import infeasible
+from rebt_ros.logic.dnf import FALSE, Dnf, conditions_of
+from rebt_ros.logic.domain import infeasible, spelled_out
 from rebt_ros.logic.factoring import Factored, factor, pull_out_common
 from rebt_ros.logic.float_reduction import float_reduction
 from rebt_ros.logic.minimize import minimize
+
+#: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and
+#: entanglement make espresso take minutes there.
+MOST_LEAVES_BY_DOMAIN = 48
 
 #: Up to this many rules the best order is found, beyond it the order that is best step by step.
 _MOST_RULES_IN_ANY_ORDER = 6
@@ -35,7 +39,7 @@ class Reductions:
     """The reductions past the paper, each of which can be left out."""
 
     domain: bool = True
-    """Infeasible combinations of conditions are don't-cares."""
+    """Infeasible combinations of conditions are don't-cares, in trees of up to 48 leaves."""
     repeated_factoring: bool = True
     """Factoring is repeated instead of done once."""
     priority: bool = True
@@ -57,29 +61,27 @@ def reduced_tree(
         reductions: What to do; priority is for Selectors only.
         root: Kind of the root node.
     """
-    domain = (
-        infeasible(conditions_of(_union(rule.dnf for rule in rules)))
-        if reductions.domain
-        else FALSE
-    )
+    leaves = sum(len(rule.dnf) for rule in rules)
+    conditions = conditions_of(_union(rule.dnf for rule in rules))
+    by_domain = reductions.domain and leaves <= MOST_LEAVES_BY_DOMAIN
+    impossible = infeasible(conditions) if by_domain else FALSE
+    outside = [spelled_out(rule.dnf, conditions) if by_domain else rule.dnf for rule in rules]
 
     @cache
     def child(rule: int, earlier: frozenset[int]) -> nodes.Node:
-        if len(earlier) == len(rules) - 1:
-            return _child(rules[rule].actions, TRUE, reductions)
-        taken = (rules[one].dnf for one in sorted(earlier))
-        minimized = minimize(rules[rule].dnf, dont_care=_union((*taken, domain)))
+        later = [one for one in range(len(rules)) if one != rule and one not in earlier]
+        minimized = minimize(
+            rules[rule].dnf,
+            dont_care=_union((*(rules[one].dnf for one in sorted(earlier)), impossible)),
+            off=_union(outside[one] for one in later),
+        )
         return _child(rules[rule].actions, float_reduction(minimized), reductions)
 
-    if not reductions.priority or root is not Root.SELECTOR:
-        alone = [minimize(rule.dnf, dont_care=domain) for rule in rules]
-        trees = [
-            _child(rule.actions, float_reduction(dnf), reductions)
-            for rule, dnf in zip(rules, alone, strict=True)
-        ]
-    else:
+    if reductions.priority and root is Root.SELECTOR:
         order = _best_order(len(rules), lambda rule, earlier: nodes.size(child(rule, earlier)))
         trees = [child(rule, frozenset(order[:place])) for place, rule in enumerate(order)]
+    else:
+        trees = [child(rule, frozenset()) for rule in range(len(rules))]
     return with_root(root, trees)
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rebt_ros.algorithms.priority_root import MOST_LEAVES_BY_DOMAIN
 from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.choosing import convert
@@ -21,8 +22,6 @@ from rebt_ros.suggesting import accept
 
 #: The first, the last, the best and the chosen level are always among them.
 FEWEST_LEVELS = 4
-#: For larger decision trees the domain's don't-cares take espresso minutes and more.
-_MOST_LEAVES_WITH_DOMAIN = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +101,9 @@ class Family:
         learning, ccp_alpha = self.learning, float(self.ccp_alphas[number])
         trained = learning.policy.fitted.at(ccp_alpha)
         leaves, chosen = int(self.leaves[number]), number == self.chosen
-        # The chosen one was made before, so it can be made again.
-        within = self.options if chosen else _within_reason(self.options, leaves)
         # Suggestions belong to the published tree.
         tree, _ = accept(
-            convert(trained, within, psa=learning.policy.psa), (), replace(self.options, attach=())
+            convert(trained, self.options, psa=learning.policy.psa), (), replace(self.options, attach=())
         )
         figures = figures_of(learning.table, learning.held_out, trained, tree)
         return Level(
@@ -118,7 +115,7 @@ class Family:
             self._cross_validated(ccp_alpha),
             chosen,
             number == self.best,
-            within == self.options,
+            leaves <= MOST_LEAVES_BY_DOMAIN,
         )
 
     def _cross_validated(self, ccp_alpha: float) -> CrossValidated | None:
@@ -151,9 +148,3 @@ def _nearest(levels: set[int], to: int) -> int:
 def _level_of(ccp_alphas: FloatArray, ccp_alpha: float) -> int:
     """A level stands for all alphas from its own up to the next one's."""
     return int(np.searchsorted(ccp_alphas, ccp_alpha, side="right")) - 1
-
-
-def _within_reason(options: LearnOptions, leaves: int) -> LearnOptions:
-    if options.reductions is None or leaves <= _MOST_LEAVES_WITH_DOMAIN:
-        return options
-    return replace(options, reductions=replace(options.reductions, domain=False))

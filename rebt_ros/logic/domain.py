@@ -8,7 +8,7 @@ in every state.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations, pairwise
 
 from rebt_ros.logic.conditions import (
@@ -20,6 +20,59 @@ from rebt_ros.logic.conditions import (
     Threshold,
 )
 from rebt_ros.logic.dnf import Conjunction, Dnf
+
+
+def spelled_out(dnf: Dnf, conditions: Iterable[Condition]) -> Dnf:
+    """The DNF with the literals that its own literals imply, of the given conditions.
+
+    Two conjunctions that hold in some state, one of them spelled out, have an assignment in common
+    only if they have a state in common.
+
+    >>> near, reachable = Threshold("x", 0.3), Threshold("x", 0.5)
+    >>> spelled_out(Dnf((Conjunction((Literal(near),)),)), [near, reachable]) == Dnf(
+    ...     (Conjunction((Literal(near), Literal(reachable))),)
+    ... )
+    True
+    """
+    related: dict[Hashable, list[Condition]] = {}
+    for condition in dict.fromkeys(conditions):
+        related.setdefault(_subject(condition), []).append(condition)
+    spelled: list[Conjunction] = []
+    for conjunction in dnf:
+        implied = (one for literal in conjunction for one in _implied(literal, related))
+        literals = tuple(dict.fromkeys((*conjunction, *implied)))
+        # One that contradicts itself holds in no state.
+        if not any(~literal in literals for literal in literals):
+            spelled.append(Conjunction(literals))
+    return Dnf(tuple(spelled))
+
+
+def _subject(condition: Condition) -> Hashable:
+    """What a condition is about; conditions about different things say nothing of each other."""
+    match condition:
+        case LastActionIs(deciding=deciding):
+            return deciding
+        case _:
+            return type(condition), condition.feature
+
+
+def _implied(
+    literal: Literal, related: Mapping[Hashable, Sequence[Condition]]
+) -> Iterator[Literal]:
+    condition = literal.condition
+    others = related.get(_subject(condition), ())
+    match condition:
+        case Threshold(value=value):
+            for other in others:
+                if isinstance(other, Threshold) and (
+                    other.value > value if literal.positive else other.value < value
+                ):
+                    yield Literal(other, literal.positive)
+        case HasCategory() | LastActionIs():
+            if literal.positive:
+                yield from (~Literal(other) for other in others if other != condition)
+        case IsTrue():
+            pass
 
 
 def infeasible(conditions: Iterable[Condition]) -> Dnf:

@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TypeAlias
 
-from pyeda.boolalg.espresso import DTYPE, FTYPE, espresso
+from pyeda.boolalg.espresso import DTYPE, FTYPE, RTYPE, espresso
 
 from rebt_ros.logic.conditions import Condition, Literal
 from rebt_ros.logic.dnf import FALSE, TRUE, Conjunction, Dnf, conditions_of
 
 #: Positional cube notation: what espresso calls the value of one input.
 _NEGATIVE, _POSITIVE, _ABSENT = 1, 2, 3
-#: Value of the only output: in the ON-set, or free to be either.
-_ON, _DONT_CARE = 1, 2
+#: Value of the only output: not in the ON-set, in it, or free to be either.
+_OFF, _ON, _DONT_CARE = 0, 1, 2
 
 _Cube: TypeAlias = tuple[int, ...]
 
@@ -25,12 +25,15 @@ _Cube: TypeAlias = tuple[int, ...]
 _EITHER_WAY = {((2, 2, 3), (_ON,)), ((1, 1, 3), (_ON,)), ((2, 3, 2), (_ON,))}
 
 
-def minimize(dnf: Dnf, dont_care: Dnf = FALSE) -> Dnf:
+def minimize(dnf: Dnf, dont_care: Dnf = FALSE, off: Dnf | None = None) -> Dnf:
     """An equivalent DNF with (nearly) the fewest conjunctions and literals.
 
     Args:
         dnf: Where the rule must hold.
         dont_care: Where the result may do either.
+        off: Where it must not hold, if that is known: espresso then need not find out by taking a
+            complement, which can be much larger than the rule.  `dnf`, `dont_care` and `off`
+            cover all assignments between them.
 
     Returns:
         A DNF equal to `dnf` on every assignment of its conditions outside `dont_care`.  Literals
@@ -39,12 +42,19 @@ def minimize(dnf: Dnf, dont_care: Dnf = FALSE) -> Dnf:
     if dnf.is_true or dnf == FALSE:
         # Espresso has no cubes of zero inputs.
         return TRUE if dnf.is_true else FALSE
-    vocabulary = conditions_of(Dnf(dnf.conjunctions + dont_care.conjunctions))
+    if off == FALSE:
+        return TRUE
+    given = Dnf(dnf.conjunctions + dont_care.conjunctions + (off or FALSE).conjunctions)
+    vocabulary = conditions_of(given)
     place = {condition: place for place, condition in enumerate(vocabulary)}
     cover = [(_cube(conjunction, place), (_ON,)) for conjunction in dnf]
     cover += [(_cube(conjunction, place), (_DONT_CARE,)) for conjunction in dont_care]
+    kinds = FTYPE | DTYPE
+    if off is not None:
+        cover += [(_cube(conjunction, place), (_OFF,)) for conjunction in off]
+        kinds |= RTYPE
     _rewind()
-    minimized = espresso(len(vocabulary), 1, cover, FTYPE | DTYPE)
+    minimized = espresso(len(vocabulary), 1, cover, kinds)
     cubes = sorted((inputs for inputs, _ in minimized), key=_reading_order)
     return Dnf(tuple(_conjunction(cube, vocabulary) for cube in cubes))
 
