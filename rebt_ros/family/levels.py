@@ -102,9 +102,8 @@ class Family:
         trained = learning.policy.fitted.at(ccp_alpha)
         leaves, chosen = int(self.leaves[number]), number == self.chosen
         # Suggestions belong to the published tree.
-        tree, _ = accept(
-            convert(trained, self.options, psa=learning.policy.psa), (), replace(self.options, attach=())
-        )
+        whole = convert(trained, self.options, psa=learning.policy.psa)
+        tree, _ = accept(whole, (), replace(self.options, attach=()))
         figures = figures_of(learning.table, learning.held_out, trained, tree)
         return Level(
             number,
