@@ -18,6 +18,7 @@ from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.logic.conditions import Interval
 from rebt_ros.options import LearnOptions
 from rebt_ros.pipeline import Learning, Progress
 from rebt_ros.replay import Replay
@@ -141,6 +142,7 @@ def summarize(result: OfflineLearning) -> dict[str, Any]:
         "features": [feature.name for feature in learned.features],
         "actions": [action.label for action in learned.actions],
         "nodes": nodes.size(learned.tree),
+        "intervals": _intervals(learned.tree),
         "depth": nodes.depth(learned.tree),
         "fidelity_mismatches": figures.fidelity_mismatches,
         "held_out_rows": figures.held_out_rows,
@@ -172,12 +174,18 @@ def _of_channel(learning: Learning) -> dict[str, Any]:
     return {
         "rows": learning.learned.provenance.rows,
         "nodes": nodes.size(learning.learned.tree),
+        "intervals": _intervals(learning.learned.tree),
         "ccp_alpha": learning.policy.ccp_alpha,
         "fidelity_mismatches": figures.fidelity_mismatches,
         "teacher_forced_agreement": figures.teacher_forced_agreement,
         "own_history_agreement": figures.own_history_agreement,
         **_choices(learning),
     }
+
+
+def _intervals(tree: nodes.Node) -> int:
+    """Pairs of thresholds that stand in the tree as one condition."""
+    return sum(isinstance(one.literal.condition, Interval) for one in nodes.conditions(tree))
 
 
 def _choices(learning: Learning) -> dict[str, Any]:

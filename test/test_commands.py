@@ -66,6 +66,7 @@ def test_learn_writes_tree_summary_and_pictures_without_ros(learned: Path) -> No
     assert summary["actions"] == ["charge", "go", "turn"]
     assert summary["fidelity_mismatches"] == 0
     assert summary["nodes"] == 8
+    assert summary["intervals"] == 0
     assert {"ccp_alpha", "teacher_forced_agreement", "own_history_agreement"} <= set(summary)
     assert {action.label for action in read_tree(learned / "tree.json").actions} == {
         "charge",

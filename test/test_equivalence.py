@@ -168,9 +168,9 @@ def test_the_behavior_tree_chooses_what_the_decision_tree_predicts_at_every_feas
 
 @pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])
 @pytest.mark.parametrize(
-    "reductions", [Reductions(*flags) for flags in itertools.product((True, False), repeat=3)]
+    "reductions", [Reductions(*flags) for flags in itertools.product((True, False), repeat=4)]
 )
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(table=tables())
 def test_a_reduced_tree_chooses_what_the_decision_tree_predicts_at_every_feasible_state(
     reductions: Reductions, root: Root, table: DemonstrationTable
