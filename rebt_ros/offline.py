@@ -184,8 +184,9 @@ def _of_channel(learning: Learning) -> dict[str, Any]:
 
 
 def _intervals(tree: nodes.Node) -> int:
-    """Pairs of thresholds that stand in the tree as one condition."""
-    return sum(isinstance(one.literal.condition, Interval) for one in nodes.conditions(tree))
+    """Nodes that stand for two thresholds each."""
+    conditions = (node for node in nodes.walk(tree) if isinstance(node, nodes.Condition))
+    return sum(isinstance(one.literal.condition, Interval) for one in conditions)
 
 
 def _choices(learning: Learning) -> dict[str, Any]:
