@@ -24,6 +24,7 @@ from rebt_ros.family.files import (
     write_family,
 )
 from rebt_ros.family.levels import Family, check_most_levels
+from rebt_ros.logic.conditions import Interval
 from rebt_ros.options import LearnOptions
 from rebt_ros.pipeline import Learning, Progress
 from rebt_ros.replay import Replay
@@ -185,6 +186,7 @@ def summarize(result: OfflineLearning) -> dict[str, Any]:
         "features": [feature.name for feature in learned.features],
         "actions": [action.label for action in learned.actions],
         "nodes": nodes.size(learned.tree),
+        "intervals": _intervals(learned.tree),
         "depth": nodes.depth(learned.tree),
         "fidelity_mismatches": figures.fidelity_mismatches,
         "held_out_rows": figures.held_out_rows,
@@ -216,12 +218,19 @@ def _of_channel(learning: Learning) -> dict[str, Any]:
     return {
         "rows": learning.learned.provenance.rows,
         "nodes": nodes.size(learning.learned.tree),
+        "intervals": _intervals(learning.learned.tree),
         "ccp_alpha": learning.policy.ccp_alpha,
         "fidelity_mismatches": figures.fidelity_mismatches,
         "teacher_forced_agreement": figures.teacher_forced_agreement,
         "own_history_agreement": figures.own_history_agreement,
         **_choices(learning),
     }
+
+
+def _intervals(tree: nodes.Node) -> int:
+    """Nodes that stand for two thresholds each."""
+    conditions = (node for node in nodes.walk(tree) if isinstance(node, nodes.Condition))
+    return sum(isinstance(one.literal.condition, Interval) for one in conditions)
 
 
 def _choices(learning: Learning) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import (
     Condition,
     HasCategory,
+    Interval,
     IsTrue,
     LastActionIs,
     Literal,
@@ -119,6 +120,8 @@ def _satisfied(condition: Condition, state: Sequence[float], last_action: str | 
     match condition:
         case Threshold(value=threshold):
             return value <= threshold
+        case Interval(above=above, at_most=most):
+            return above < value <= most
         case IsTrue():
             return value == 1
         case HasCategory(category=category):
@@ -145,6 +148,12 @@ def thresholds(feature: str | None = None) -> st.SearchStrategy[Threshold]:
     return st.builds(Threshold, names, st.sampled_from(THRESHOLDS))
 
 
+def intervals(feature: str | None = None) -> st.SearchStrategy[Interval]:
+    names = st.sampled_from(("distance", "battery")) if feature is None else st.just(feature)
+    ends = st.sampled_from(tuple(itertools.combinations(THRESHOLDS, 2)))
+    return st.builds(lambda name, between: Interval(name, *between), names, ends)
+
+
 def last_actions(deciding: bool = True) -> st.SearchStrategy[LastActionIs]:
     groups = st.lists(st.sampled_from(LABELS), unique=True, max_size=3 if deciding else 0)
     return st.builds(LastActionIs, st.sampled_from(LABELS), groups.map(tuple))
@@ -152,10 +161,11 @@ def last_actions(deciding: bool = True) -> st.SearchStrategy[LastActionIs]:
 
 def conditions(
     last_action: bool = True, deciding: bool = True
-) -> st.SearchStrategy[Threshold | IsTrue | HasCategory | LastActionIs]:
+) -> st.SearchStrategy[Threshold | Interval | IsTrue | HasCategory | LastActionIs]:
     """Conditions on `FEATURES` and, unless told otherwise, LAT."""
     kinds: list[st.SearchStrategy[Condition]] = [
         thresholds(),
+        intervals(),
         st.just(IsTrue("docked")),
         st.sampled_from(FEATURES[3].categories).map(lambda name: HasCategory("kind", name)),
     ]
@@ -288,6 +298,8 @@ def rule_trees(draw: st.DrawFn) -> nodes.Node:
 #: Anything that can be encoded.
 names = st.text(st.characters(exclude_categories=("Cs",)), max_size=6)
 finite = st.floats(allow_nan=False, allow_infinity=False)
+#: Of intervals.
+ends = st.lists(finite, min_size=2, max_size=2, unique=True).map(sorted)
 
 
 @st.composite
@@ -312,6 +324,7 @@ def _conditions_on(
     ]
     for one in declared:
         kinds.append(st.builds(Threshold, st.just(one.name), finite))
+        kinds.append(ends.map(lambda between, name=one.name: Interval(name, *between)))
         kinds.append(st.just(IsTrue(one.name)))
         if one.categories:
             category = st.sampled_from(one.categories)

@@ -66,6 +66,7 @@ def test_learn_writes_tree_summary_and_pictures_without_ros(learned: Path) -> No
     assert summary["actions"] == ["charge", "go", "turn"]
     assert summary["fidelity_mismatches"] == 0
     assert summary["nodes"] == 8
+    assert summary["intervals"] == 0
     assert {"ccp_alpha", "teacher_forced_agreement", "own_history_agreement"} <= set(summary)
     assert {action.label for action in read_tree(learned / "tree.json").actions} == {
         "charge",
@@ -94,6 +95,28 @@ def test_learn_follows_its_options(table: Path, tmp_path: Path) -> None:
     assert summary["delta"] == 0.1
     assert summary["held_out_rows"] == 40
     assert summary["refit"] is True
+
+
+def test_learn_counts_the_intervals_unless_they_are_kept_apart(tmp_path: Path) -> None:
+    rows = [
+        (place / 10, inside, "turn" if not 3 < place <= 7 else "charge" if inside else "go")
+        for place in range(11)
+        for inside in (0, 1)
+    ]
+    lines = [f"{front},{inside},{action}" for front, inside, action in rows * 4]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(["front,docked,action", *lines]) + "\n")
+    sizes = {}
+    # Two rules ask for the same one.
+    for option, intervals in (("default", 2), ("--no-intervals", 0), ("--paper", 0)):
+        options = [] if option == "default" else [option]
+        done = run("learn", path, "--out", tmp_path, "--test-fraction", "0", *options)
+        assert done.returncode == 0, done.stderr
+        summary = json.loads((tmp_path / "summary.json").read_text())
+        assert summary["intervals"] == intervals
+        assert ("0.35 < front ≤ 0.75" in done.stdout) is (intervals > 0)
+        sizes[option] = summary["nodes"]
+    assert sizes["default"] < sizes["--no-intervals"] < sizes["--paper"]
 
 
 def test_replay_shows_agreement_confusion_and_disagreements(learned: Path, table: Path) -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from rebt_ros.logic.conditions import (
     KNOWN,
     HasCategory,
+    Interval,
     IsTrue,
     LastActionIs,
     Literal,
@@ -45,6 +46,21 @@ def test_of_a_literal_and_its_negation_exactly_one_holds(
 def test_a_threshold_is_finite(value: float) -> None:
     with pytest.raises(ValueError, match="'distance' must be finite"):
         Threshold("distance", value)
+
+
+@pytest.mark.parametrize(
+    ("above", "at_most"),
+    [(math.nan, 0.5), (0.3, math.nan), (-math.inf, 0.5), (0.3, math.inf)],
+)
+def test_an_interval_is_finite(above: float, at_most: float) -> None:
+    with pytest.raises(ValueError, match="'distance' must be finite"):
+        Interval("distance", above, at_most)
+
+
+@pytest.mark.parametrize(("above", "at_most"), [(0.5, 0.3), (0.3, 0.3), (-0.0, 0.0)])
+def test_an_interval_is_not_empty(above: float, at_most: float) -> None:
+    with pytest.raises(ValueError, match="'distance' must not be empty"):
+        Interval("distance", above, at_most)
 
 
 def test_the_threshold_above_all_values_is_the_largest_double() -> None:

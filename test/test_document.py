@@ -24,7 +24,14 @@ from rebt_ros.behavior_tree.document import (
 )
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, SuggestionKind
 from rebt_ros.errors import DocumentError
-from rebt_ros.logic.conditions import HasCategory, IsTrue, LastActionIs, Literal, Threshold
+from rebt_ros.logic.conditions import (
+    HasCategory,
+    Interval,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    Threshold,
+)
 
 SCHEMA = Draft202012Validator(json_schema())
 
@@ -41,6 +48,7 @@ EVERY_NODE = nodes.Parallel(
                 some.action("turn"),
             )
         ),
+        nodes.Condition(Literal(Interval("battery", 0.1, 0.7))),
     )
 )
 FULL = LearnedTree(
@@ -106,6 +114,16 @@ def test_thresholds_keep_every_bit(value: float) -> None:
     assert struct.pack("d", loaded.literal.condition.value) == struct.pack("d", value)
 
 
+@given(some.ends)
+def test_ends_of_intervals_keep_every_bit(between: list[float]) -> None:
+    tree = nodes.Condition(Literal(Interval("distance", *between)))
+    loaded = loads(dumps(some.learned(tree))).tree
+    assert isinstance(loaded, nodes.Condition)
+    interval = loaded.literal.condition
+    assert isinstance(interval, Interval)
+    assert struct.pack("2d", interval.above, interval.at_most) == struct.pack("2d", *between)
+
+
 def test_the_schema_is_one() -> None:
     Draft202012Validator.check_schema(json_schema())
 
@@ -133,6 +151,7 @@ EXTRA_RULES = (
     "more than 100 levels",
     "whole characters",
     "finite number",
+    "must not be empty",
 )
 
 
@@ -262,6 +281,18 @@ Change = Callable[[dict[str, Any]], object]
         (
             lambda d: d["tree"]["children"][0]["children"][0]["test"].update(feature="speed"),
             "feature 'speed' is not declared",
+        ),
+        (
+            lambda d: d["tree"]["children"][5]["test"].update(feature="speed"),
+            "feature 'speed' is not declared",
+        ),
+        (
+            lambda d: d["tree"]["children"][5]["test"].update(above=None),
+            "document.tree.children[5].test.above must be a number, not None.",
+        ),
+        (
+            lambda d: d["tree"]["children"][5]["test"].update(above=0.7),
+            "the interval of 'battery' must not be empty, as from 0.7 to 0.7",
         ),
         (
             lambda d: d["tree"]["children"][2]["children"][0]["test"].update(category="plate"),

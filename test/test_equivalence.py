@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rebt_ros.algorithms.priority_root import Reductions, reduced_tree
@@ -65,6 +65,24 @@ def tables(draw: st.DrawFn) -> DemonstrationTable:
         demonstration=np.cumsum([row[5] for row in drawn]).astype(np.int64),
         stamps=np.arange(len(drawn)),
     )
+
+
+def _in_between() -> DemonstrationTable:
+    places = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+    return DemonstrationTable(
+        channel="action",
+        features=FEATURES,
+        states=np.array([(place, math.nan, 0.0, 0.0) for place in places]),
+        actions=LABELS,
+        chosen=np.array([0, 0, 2, 2, 0, 0]),
+        demonstrations=tuple(f"demonstration {n}" for n in range(len(places))),
+        demonstration=np.arange(len(places)),
+        stamps=np.arange(len(places)),
+    )
+
+
+#: Turns between two distances and goes elsewhere, whatever came before: asks for an interval.
+IN_BETWEEN = _in_between()
 
 
 def feasible_states(tree: DecisionTree, table: DemonstrationTable) -> DemonstrationTable:
@@ -168,10 +186,11 @@ def test_the_behavior_tree_chooses_what_the_decision_tree_predicts_at_every_feas
 
 @pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])
 @pytest.mark.parametrize(
-    "reductions", [Reductions(*flags) for flags in itertools.product((True, False), repeat=3)]
+    "reductions", [Reductions(*flags) for flags in itertools.product((True, False), repeat=4)]
 )
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(table=tables())
+@example(table=IN_BETWEEN)
 def test_a_reduced_tree_chooses_what_the_decision_tree_predicts_at_every_feasible_state(
     reductions: Reductions, root: Root, table: DemonstrationTable
 ) -> None:

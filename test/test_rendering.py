@@ -27,7 +27,7 @@ from rebt_ros.behavior_tree.learned_tree import (
 from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.logic.conditions import IsTrue, LastActionIs, Literal, Threshold
+from rebt_ros.logic.conditions import Interval, IsTrue, LastActionIs, Literal, Threshold
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -99,6 +99,11 @@ leaves = st.one_of(
         labels,
         st.floats(-1e9, 1e9),
     ),
+    st.builds(
+        lambda name, above: nodes.Condition(Literal(Interval(name, above, above + 1))),
+        labels,
+        st.floats(-1e9, 1e9),
+    ),
 )
 
 
@@ -144,6 +149,17 @@ def test_the_text_has_one_line_per_node_and_inverted_conditions_on_one() -> None
         "│   │   │   --> wait\n"
         "│   --> turn\n"
     )
+
+
+def test_every_view_shows_an_interval_as_a_person_writes_it() -> None:
+    between = nodes.Condition(Literal(Interval("battery", 0.30000001192092896, 0.5)))
+    document = learned(nodes.Sequence((between, act("go"))))
+    assert "--> 0.3 < battery ≤ 0.5\n" in render_text(document)
+    assert "0.3 < battery ≤ 0.5" in render_dot(document)
+    svg = render_svg(document)
+    assert "0.3 < battery ≤ 0.5" in [text.text for text in ET.fromstring(svg).iter(f"{SVG}text")]
+    titles = [title.text for title in ET.fromstring(svg).iter(f"{SVG}title")]
+    assert "Condition: 0.30000001192092896 < 'battery' <= 0.5" in titles
 
 
 def test_the_text_looks_like_the_unicode_display_of_py_trees() -> None:

@@ -22,7 +22,14 @@ from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.runtime import StateEncoder, SucceedAtOnce, TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.logic.conditions import HasCategory, IsTrue, LastActionIs, Literal, Threshold
+from rebt_ros.logic.conditions import (
+    HasCategory,
+    Interval,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    Threshold,
+)
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
 STATUS = {"R": Status.RUNNING, "S": Status.SUCCESS, "F": Status.FAILURE}
@@ -31,6 +38,7 @@ NEAR = some.at_most("distance", 0.3)
 LOW = some.at_most("battery", 0.2)
 DOCKED = Literal(IsTrue("docked"))
 CUP = Literal(HasCategory("kind", "cup"))
+BETWEEN = Literal(Interval("distance", 0.1, 0.3))
 
 #: Distance, battery, docked, kind.
 FAR_AWAY = (1.0, 1.0, 0.0, 0.0)
@@ -84,7 +92,14 @@ def run(
         (DOCKED, (0, 0, 0.0, 0), "F"),
         (CUP, (0, 0, 0, 1.0), "S"),
         (CUP, (0, 0, 0, 2.0), "F"),
+        (BETWEEN, (0.1, 0, 0, 0), "F"),
+        (BETWEEN, (math.nextafter(0.1, 1), 0, 0, 0), "S"),
+        (BETWEEN, (0.3, 0, 0, 0), "S"),
+        (BETWEEN, (math.nextafter(0.3, 1), 0, 0, 0), "F"),
+        (~BETWEEN, (0.1, 0, 0, 0), "S"),
         # A missing value satisfies no condition, and every negation.
+        (BETWEEN, (math.nan, 0, 0, 0), "F"),
+        (~BETWEEN, (math.nan, 0, 0, 0), "S"),
         (NEAR, (math.nan, 0, 0, 0), "F"),
         (~NEAR, (math.nan, 0, 0, 0), "S"),
         (DOCKED, (0, 0, math.nan, 0), "F"),

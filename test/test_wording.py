@@ -15,6 +15,7 @@ from rebt_ros.logic.conditions import (
     KNOWN,
     Condition,
     HasCategory,
+    Interval,
     IsTrue,
     LastActionIs,
     Literal,
@@ -52,6 +53,8 @@ TRICKY = [
     "a ≤ 0.5",
     "0.5",
     "a > 0.5",
+    "0.3 < a ≤ 0.5",
+    "(0.3 < a ≤ 0.5)",
     "a (before b)",
     "a (before b or c)",
     "b or c",
@@ -75,6 +78,11 @@ numbers = st.one_of(
 )
 conditions: st.SearchStrategy[Condition] = st.one_of(
     st.builds(Threshold, names, numbers),
+    st.builds(
+        lambda name, ends: Interval(name, *sorted(ends)),
+        names,
+        st.lists(numbers, min_size=2, max_size=2, unique=True),
+    ),
     st.builds(IsTrue, names),
     st.builds(HasCategory, names, names),
     st.builds(LastActionIs, names, st.lists(names, max_size=3).map(tuple)),
@@ -101,6 +109,7 @@ def text(condition: Condition, *others: Condition, positive: bool = True) -> str
         (Threshold("ticks", 1234.5678), "ticks ≤ 1235", "ticks > 1235"),
         (Threshold("charge", 0.00001234567), "charge ≤ 1.23e-5", None),
         (Threshold("x", KNOWN), "x is known", "x is missing"),
+        (Interval("x", 0.30000001192092896, 2.0), "0.3 < x ≤ 2", "not (0.3 < x ≤ 2)"),
         (IsTrue("docked"), "docked", "not docked"),
         (IsTrue("nothing_near"), "nothing_near", "not nothing_near"),
         (HasCategory("kind", "box"), "kind = box", "kind ≠ box"),
@@ -127,6 +136,8 @@ def test_a_condition_reads_as_a_person_writes_it(
         (HasCategory("kind", "box "), "kind = 'box '"),
         (HasCategory("kind", "it's\n"), "kind = 'it\\'s\\n'"),
         (Threshold("12", 0.5), "'12' ≤ 0.5"),
+        (Interval("12", 0.3, 0.5), "0.3 < '12' ≤ 0.5"),
+        (IsTrue("0.3 < x ≤ 0.5"), "'0.3 < x ≤ 0.5'"),
     ],
 )
 def test_a_name_that_can_be_misread_is_quoted(condition: Condition, expected: str) -> None:
@@ -141,6 +152,18 @@ def test_thresholds_show_more_digits_only_where_they_are_close() -> None:
         "x ≤ 5.43",
         "x ≤ 0.837",
         "x ≤ 0.8375",
+        "y ≤ 0.837",
+    ]
+
+
+def test_the_ends_of_intervals_share_their_digits_with_thresholds() -> None:
+    between, near = Interval("x", 0.83712, 5.4321), Threshold("x", 0.83749)
+    same, other = Threshold("x", 0.83712), Threshold("y", 0.83713)
+    shown = wording_of(between, near, same, other)
+    assert [shown.literal(Literal(one)) for one in (between, near, same, other)] == [
+        "0.837 < x ≤ 5.43",
+        "x ≤ 0.8375",
+        "x ≤ 0.837",
         "y ≤ 0.837",
     ]
 
@@ -221,3 +244,15 @@ def test_an_explanation_has_every_digit_and_tells_of_missing_values() -> None:
     assert Wording(node).explanation(node) == (
         "Condition: 'battery' > 0.30000001192092896, or missing"
     )
+
+
+@pytest.mark.parametrize(
+    ("positive", "expected"),
+    [
+        (True, "Condition: 0.30000001192092896 < 'x' <= 0.5"),
+        (False, "Condition: not (0.30000001192092896 < 'x' <= 0.5), or missing"),
+    ],
+)
+def test_an_explanation_has_every_digit_of_an_interval(positive: bool, expected: str) -> None:
+    node = nodes.Condition(Literal(Interval("x", 0.30000001192092896, 0.5), positive))
+    assert Wording(node).explanation(node) == expected

@@ -1,7 +1,7 @@
 """Past the paper: smaller trees with the same behavior.
 
-Infeasible combinations of conditions are don't-cares, factoring is repeated, and the children of a
-Selector root stand in order of priority.
+Infeasible combinations of conditions are don't-cares, factoring is repeated, the children of a
+Selector root stand in order of priority, and two thresholds are one interval.
 
 Under the paper's root each rule must hold in exactly its own states.  Under a Selector a child is
 reached only where all earlier ones failed, so that it may do anything in the states that they
@@ -24,6 +24,7 @@ from rebt_ros.logic.dnf import FALSE, Dnf, conditions_of
 from rebt_ros.logic.domain import infeasible, spelled_out
 from rebt_ros.logic.factoring import Factored, factor, pull_out_common
 from rebt_ros.logic.float_reduction import float_reduction
+from rebt_ros.logic.intervals import with_intervals
 from rebt_ros.logic.minimize import minimize
 
 #: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and
@@ -44,6 +45,8 @@ class Reductions:
     """Factoring is repeated instead of done once."""
     priority: bool = True
     """Rules stand in order of priority, with the states of earlier ones as don't-cares."""
+    intervals: bool = True
+    """Two thresholds that enclose a feature are one condition."""
 
 
 ALL_REDUCTIONS = Reductions()
@@ -87,6 +90,8 @@ def reduced_tree(
 
 def _child(actions: tuple[nodes.Action, ...], dnf: Dnf, reductions: Reductions) -> nodes.Node:
     condition = factor(dnf) if reductions.repeated_factoring else pull_out_common(dnf)
+    if reductions.intervals:
+        condition = with_intervals(condition)
     labels = tuple(action.label for action in actions)
     return rule_tree(FactoredRule(actions, _meant_by(labels, condition)), frozenset())
 

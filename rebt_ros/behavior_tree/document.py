@@ -31,6 +31,7 @@ from rebt_ros.errors import DocumentError
 from rebt_ros.logic.conditions import (
     Condition,
     HasCategory,
+    Interval,
     IsTrue,
     LastActionIs,
     Literal,
@@ -188,6 +189,8 @@ def _encode_condition(condition: Condition) -> Json:
     match condition:
         case Threshold(feature=feature, value=value):
             return {"type": "threshold", "feature": feature, "at_most": value}
+        case Interval(feature=feature, above=above, at_most=at_most):
+            return {"type": "interval", "feature": feature, "above": above, "at_most": at_most}
         case IsTrue(feature=feature):
             return {"type": "is_true", "feature": feature}
         case HasCategory(feature=feature, category=category):
@@ -420,6 +423,10 @@ def _condition(place: _Place) -> Condition:
         case "threshold":
             fields = place.fields("type", "feature", "at_most")
             return Threshold(fields["feature"].text(), fields["at_most"].number())
+        case "interval":
+            fields = place.fields("type", "feature", "above", "at_most")
+            above, at_most = fields["above"].number(), fields["at_most"].number()
+            return Interval(fields["feature"].text(), above, at_most)
         case "is_true":
             return IsTrue(place.fields("type", "feature")["feature"].text())
         case "has_category":

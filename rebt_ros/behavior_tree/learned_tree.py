@@ -8,7 +8,7 @@ from enum import Enum
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.logic.conditions import HasCategory, IsTrue, LastActionIs, Threshold
+from rebt_ros.logic.conditions import HasCategory, Interval, IsTrue, LastActionIs, Threshold
 
 
 class SuggestionKind(Enum):
@@ -119,7 +119,7 @@ def _problems_of(
     node: nodes.Condition, categories: dict[str, frozenset[str]], labels: set[str]
 ) -> Iterator[str]:
     match node.literal.condition:
-        case Threshold(feature=name) | IsTrue(feature=name):
+        case Threshold(feature=name) | Interval(feature=name) | IsTrue(feature=name):
             if name not in categories:
                 yield f"feature {name!r} is not declared"
         case HasCategory(feature=name, category=category):

@@ -18,6 +18,7 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import (
     Condition,
     HasCategory,
+    Interval,
     IsTrue,
     LastActionIs,
     Literal,
@@ -69,6 +70,8 @@ class States:
         match condition:
             case Threshold(value=value):
                 return np.less_equal(column, value)
+            case Interval(above=above, at_most=at_most):
+                return np.less(above, column) & np.less_equal(column, at_most)
             case IsTrue():
                 return np.equal(column, 1)
             case HasCategory(category=category):

@@ -22,6 +22,7 @@ from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import (
     Condition,
     HasCategory,
+    Interval,
     IsTrue,
     LastActionIs,
     Literal,
@@ -188,6 +189,8 @@ class TreeRuntime:
         match condition:
             case Threshold(value=value):
                 return lambda: self._state[place] <= value
+            case Interval(above=above, at_most=at_most):
+                return lambda: above < self._state[place] <= at_most
             case IsTrue():
                 return lambda: self._state[place] == 1
             case HasCategory(category=name):

@@ -4,8 +4,8 @@ Two different conditions of one tree never read the same:
 
 - Names that could be taken for something else (``a = b``, ``not docked``, an empty one) are quoted;
   what cannot be printed is escaped, so every text is a single line.
-- A threshold is rounded, but never past the middle between it and the next threshold on the same
-  feature, so the numbers stay distinct and in order.
+- A threshold, or end of an interval, is rounded, but never past the middle between it and the next
+  one on the same feature, so the numbers stay distinct and in order.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, Suggest
 from rebt_ros.logic.conditions import (
     KNOWN,
     HasCategory,
+    Interval,
     IsTrue,
     LastActionIs,
     Literal,
@@ -76,6 +77,8 @@ class Wording:
                 match node.literal.condition:
                     case Threshold(feature=name, value=value) if value != KNOWN:
                         thresholds.setdefault(name, []).append(value)
+                    case Interval(feature=name, above=above, at_most=at_most):
+                        thresholds.setdefault(name, []).extend((above, at_most))
                     case LastActionIs(action=action, deciding=group):
                         deciding.setdefault(action, set()).add(group)
         self._numbers = {name: distinct_texts(values) for name, values in thresholds.items()}
@@ -91,8 +94,11 @@ class Wording:
             case Threshold(feature=name, value=value) if value == KNOWN:
                 return f"{_feature(name)} is {'known' if positive else 'missing'}"
             case Threshold(feature=name, value=value):
-                number = self._numbers.get(name, {}).get(value, repr(value))
-                return f"{_feature(name)} {'≤' if positive else '>'} {number}"
+                return f"{_feature(name)} {'≤' if positive else '>'} {self._number(name, value)}"
+            case Interval(feature=name, above=above, at_most=at_most):
+                low, high = self._number(name, above), self._number(name, at_most)
+                between = f"{low} < {_feature(name)} ≤ {high}"
+                return between if positive else f"not ({between})"
             case IsTrue(feature=name):
                 return _feature(name) if positive else f"not {_feature(name)}"
             case HasCategory(feature=name, category=category):
@@ -100,6 +106,9 @@ class Wording:
             case LastActionIs() as last:
                 sign = "=" if positive else "≠"
                 return f"last action {sign} {_name(last.action)}{self._before(last)}"
+
+    def _number(self, feature: str, value: float) -> str:
+        return self._numbers.get(feature, {}).get(value, repr(value))
 
     def _before(self, last: LastActionIs) -> str:
         if last.action not in self._deciding_matters or not last.deciding:
@@ -299,6 +308,9 @@ def _exactly(literal: Literal) -> str:
             return f"{_quoted(name)} is {'known' if literal.positive else 'missing'}"
         case Threshold(feature=name, value=value):
             return f"{_quoted(name)} {'<=' if literal.positive else '>'} {value!r}{missing}"
+        case Interval(feature=name, above=above, at_most=at_most):
+            between = f"{above!r} < {_quoted(name)} <= {at_most!r}"
+            return between if literal.positive else f"not ({between}){missing}"
         case IsTrue(feature=name):
             return f"{_quoted(name)} is {1 if literal.positive else 0}{missing}"
         case HasCategory(feature=name, category=category):

@@ -26,6 +26,7 @@ _REDUCTIONS = {
     "domain": "do not use that thresholds, categories and last actions exclude each other",
     "repeated_factoring": "pull common conditions out once, as the paper does",
     "priority": "keep each rule to its own states, instead of ordering them by priority",
+    "intervals": "ask x > 0.3 and x ≤ 0.5 one after the other, instead of 0.3 < x ≤ 0.5",
 }
 
 

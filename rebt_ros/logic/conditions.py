@@ -1,7 +1,8 @@
 """Conditions and literals, the atoms of every rule.
 
 condition
-    An atomic test of the state: `Threshold`, `IsTrue`, `HasCategory` or `LastActionIs`.
+    An atomic test of the state: `Threshold`, `Interval`, `IsTrue`, `HasCategory` or
+    `LastActionIs`.
 literal
     A condition or its negation.
 
@@ -28,6 +29,27 @@ class Threshold:
     def __post_init__(self) -> None:
         if not math.isfinite(self.value):
             raise ValueError(f"the threshold of {self.feature!r} must be finite, not {self.value}")
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """``above < feature <= at_most``, compared in double precision."""
+
+    feature: str
+    above: float
+    at_most: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.above) and math.isfinite(self.at_most)):
+            raise ValueError(
+                f"the interval of {self.feature!r} must be finite, not from {self.above} to "
+                f"{self.at_most}"
+            )
+        if not self.above < self.at_most:
+            raise ValueError(
+                f"the interval of {self.feature!r} must not be empty, as from {self.above} to "
+                f"{self.at_most}"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +80,7 @@ class LastActionIs:
     deciding: tuple[str, ...] = ()
 
 
-Condition: TypeAlias = Threshold | IsTrue | HasCategory | LastActionIs
+Condition: TypeAlias = Threshold | Interval | IsTrue | HasCategory | LastActionIs
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from itertools import combinations, pairwise
 from rebt_ros.logic.conditions import (
     Condition,
     HasCategory,
+    Interval,
     IsTrue,
     LastActionIs,
     Literal,
@@ -94,7 +95,8 @@ def infeasible(conditions: Iterable[Condition]) -> Dnf:
                 exclusive.setdefault(feature, []).append(condition)
             case LastActionIs(deciding=deciding):
                 exclusive.setdefault(deciding, []).append(condition)
-            case IsTrue():
+            case IsTrue() | Interval():
+                # Nothing is said of intervals, which are made of rules that are minimized already.
                 pass
     # Neighbours are enough: below the first but not below the third threshold means not to lie
     # between one of the two pairs of neighbours.

@@ -1,0 +1,58 @@
+"""Two thresholds on one feature as one interval, as a person writes it.
+
+Not ``x <= 0.3`` and ``x <= 0.5`` is ``0.3 < x <= 0.5``.  Both are false where x is missing, so that
+the truth value is unchanged in every state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rebt_ros.logic.conditions import KNOWN, Interval, Literal, Threshold
+from rebt_ros.logic.factoring import Factored
+
+
+def with_intervals(condition: Factored) -> Factored:
+    """The condition with intervals in place of the pairs of thresholds in each conjunction.
+
+    Args:
+        condition: Factored already: as one condition, a pair cannot be pulled apart any more.
+    """
+    return Factored(
+        merged(condition.common), tuple(with_intervals(one) for one in condition.alternatives)
+    )
+
+
+def merged(conjunction: Iterable[Literal]) -> tuple[Literal, ...]:
+    """The literals with each pair as one interval, which stands where the first of the two stood.
+
+    >>> near, reachable = Literal(Threshold("x", 0.3)), Literal(Threshold("x", 0.5))
+    >>> merged((reachable, ~near))
+    (Literal(condition=Interval(feature='x', above=0.3, at_most=0.5), positive=True),)
+    >>> merged((near, ~reachable)) == (near, ~reachable)
+    True
+    """
+    literals: list[Literal] = []
+    for literal in conjunction:
+        for place, earlier in enumerate(literals):
+            interval = _interval(earlier, literal)
+            if interval is not None:
+                literals[place] = Literal(interval)
+                break
+        else:
+            literals.append(literal)
+    return tuple(literals)
+
+
+def _interval(one: Literal, other: Literal) -> Interval | None:
+    """What two literals say together, if that is an interval."""
+    lower, upper = (one, other) if other.positive else (other, one)
+    match lower, upper:
+        case (
+            Literal(condition=Threshold(feature=feature, value=above), positive=False),
+            Literal(condition=Threshold(feature=same, value=at_most), positive=True),
+        ) if feature == same and above < at_most and at_most != KNOWN:
+            # "x > 0.3" and "x is known" read better than an interval up to the largest number.
+            return Interval(feature, above, at_most)
+        case _:
+            return None
