@@ -125,6 +125,7 @@ def _write(
         "random_state": options.random_state,
         "test_fraction": options.test_fraction,
         "refit": options.refit,
+        "lags": options.lags,
         "versions": _versions(),
     }
     text = json.dumps(summary, indent=2, ensure_ascii=False)
