@@ -212,7 +212,10 @@ def _rules(draw: st.DrawFn, features: tuple[Feature, ...]) -> nodes.Node:
     return nodes.Selector(
         tuple(
             some.when(
-                *(Literal(condition(), draw(st.booleans())) for _ in range(draw(st.integers(1, 2)))),
+                *(
+                    Literal(condition(), draw(st.booleans()))
+                    for _ in range(draw(st.integers(1, 2)))
+                ),
                 then=draw(st.sampled_from(some.ACTIONS)),
             )
             for _ in range(draw(st.integers(1, 4)))

@@ -270,10 +270,11 @@ class _Place:
         if isinstance(number, float) and number.is_integer():
             # JSON does not tell 2.0 from 2.
             number = int(number)
-        whole = isinstance(number, int) and not isinstance(number, bool)
-        if not whole or number < least or (most is not None and number > most):
-            bounds = f"of at least {least}" if most is None else f"from {least} to {most}"
-            self.refuse(f"a whole number {bounds}")
+        expected = f"of at least {least}" if most is None else f"from {least} to {most}"
+        if isinstance(number, bool) or not isinstance(number, int) or number < least:
+            self.refuse(f"a whole number {expected}")
+        if most is not None and number > most:
+            self.refuse(f"a whole number {expected}")
         return number
 
     def truth(self) -> bool:

@@ -284,7 +284,10 @@ class StateEncoder:
         for place, (feature, _, _) in enumerate(self._sources):
             if feature.kind is FeatureKind.CATEGORICAL:
                 present[place] = self._codes[place].get(present[place], math.nan)
-        state = [self._at(feature.lag, place, present) for place, (feature, _, _) in enumerate(self._sources)]
+        state = [
+            self._at(feature.lag, place, present)
+            for place, (feature, _, _) in enumerate(self._sources)
+        ]
         self._past.appendleft(present)
         return state
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-
 #: How many rows a feature may look back.
 LARGEST_LAG = 20
 
