@@ -294,11 +294,13 @@ def test_a_tree_looks_back_at_ticks_since_it_was_last_halted_or_swapped(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
     known_before = Condition(Literal(Threshold("x[t-1]", 1e6)))
-    tree = Selector((Sequence((known_before, GO)), TURN))
-    learned = _learned(tree)
     lagged = Feature("x[t-1]", topic="state", index=1, lag=1)
-    learned = replace(learned, features=(*learned.features, lagged))
-    parameters = {"enabled": True, "publish": "on_change", "rate": 100.0}
+    learned = replace(
+        _learned(Selector((GO, TURN))),
+        features=(lagged,),
+        tree=Selector((Sequence((known_before, GO)), TURN)),
+    )
+    parameters = {"enabled": True, "publish": "on_change", "rate": 100.0, "state_timeout": 2.0}
     with NodeProcess("executor_node", domain, tmp_path, parameters):
         _publish(peer, learned)
         robot = Robot(peer)
@@ -312,6 +314,7 @@ def test_a_tree_looks_back_at_ticks_since_it_was_last_halted_or_swapped(
         assert peer.call("/executor/enable", True).success
         did(2)
         # No state for a while.
+        peer.diagnostics.clear()
         _status(peer, "waiting for state")
         did(3)
         _publish(peer, replace(learned, actions=(*learned.actions, STOP)))
