@@ -170,6 +170,7 @@ def _write_summary(
         "random_state": options.random_state,
         "test_fraction": options.test_fraction,
         "refit": options.refit,
+        "lags": options.lags,
         "versions": _versions(),
     }
     text = json.dumps(summary, indent=2, ensure_ascii=False)

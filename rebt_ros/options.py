@@ -9,6 +9,7 @@ from enum import Enum
 from rebt_ros.algorithms.priority_root import ALL_REDUCTIONS, Reductions
 from rebt_ros.algorithms.suggestions import PsaChoice
 from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.demonstration.schema import LARGEST_LAG
 from rebt_ros.errors import OptionError
 
 
@@ -50,6 +51,8 @@ class LearnOptions:
     """Whether the tree is learned from all rows in the end, once it has been judged."""
     random_state: int = 0
     """Decides between equally good splits."""
+    lags: int = 0
+    """How many rows each state feature looks back, 0 to 20; rows should be evenly spaced."""
     attach: tuple[str, ...] = ()
     """Ids of the suggestions to attach, or `ALL`."""
     psa_choice: PsaChoice | None = None
@@ -68,6 +71,8 @@ class LearnOptions:
             )
         if not 0 <= self.random_state < 2**32:
             raise OptionError(f"random_state must be a 32-bit number, not {self.random_state}.")
+        if not 0 <= self.lags <= LARGEST_LAG:
+            raise OptionError(f"lags must lie between 0 and {LARGEST_LAG}, not at {self.lags}.")
 
     @property
     def is_paper(self) -> bool:

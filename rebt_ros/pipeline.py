@@ -20,6 +20,7 @@ from rebt_ros.behavior_tree.learned_tree import (
 from rebt_ros.choosing import Policy, choose, convert
 from rebt_ros.decision_tree.training import TrainedTree, train
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.lags import evenly_spaced, with_lags
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, OptionError
@@ -41,6 +42,11 @@ class Learning:
     notes: tuple[str, ...] = ()
     """What a person should know about it; no full stops."""
 
+
+_UNEVEN = (
+    "the rows of channel {!r} are not evenly spaced, so that a row back is now more, now less time "
+    "back: record with a sample rate to use lags"
+)
 
 #: Told what is being done and which share of the work is behind.
 Progress = Callable[[str, float], None]
@@ -158,13 +164,21 @@ def learn_from(
     options: LearnOptions = DEFAULTS,
     progress: Progress = lambda stage, share: None,
 ) -> Learning:
-    """Learns the policy of one channel; see `learn`."""
+    """Learns the policy of one channel; see `learn`.
+
+    Args:
+        table: Its rows, without lagged features: those that the options ask for are added.
+        options: How to learn.
+        progress: Told what is being done and which share of the work is behind.
+    """
     if len(np.unique(table.chosen)) < 2:
         shown = table.actions[table.chosen[0]]
         raise InputError(
             f"the {len(table)} rows of channel {table.channel!r} show one action only ({shown!r}): "
             "demonstrate at least two, as there is nothing to decide between."
         )
+    # Before any rows are set apart, so that each still knows those before it.
+    table = with_lags(table, options.lags)
     held_out = table.held_out(options.test_fraction)
     shown = table.where(~held_out)
     progress("choosing", 0.1)
@@ -180,6 +194,8 @@ def learn_from(
         figures = replace(figures, fidelity_mismatches=_mismatches(table, trained, tree))
     learned_from = table if options.refit else shown
     suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options)
+    if options.lags and not evenly_spaced(table):
+        notes = (*notes, _UNEVEN.format(table.channel))
     tree, suggestions = accept(tree, suggestions, options)
     learned = as_learned(table, trained, tree, policy.ccp_alpha, figures, options)
     progress("done", 1.0)

@@ -12,6 +12,7 @@ from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.lags import with_lags
 from rebt_ros.demonstration.last_action import NO_ACTION
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, category, tabulate
@@ -64,7 +65,8 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tup
         InputError: There are no rows, or they lack a channel or a feature that the tree tests.
     """
     policies = nodes.policies(learned.tree)
-    tables = {table.channel: table for table in tabulate(demonstrations)}
+    lags = max((feature.lag for feature in learned.features), default=0)
+    tables = {table.channel: with_lags(table, lags) for table in tabulate(demonstrations)}
     if len(policies) == len(tables) == 1:
         [(channel, policy)], [table] = policies.items(), tables.values()
         return (_replay(learned, channel, policy, table),)
@@ -127,9 +129,10 @@ def _as_the_tree_reads(
     recorded = {feature.name: place for place, feature in enumerate(table.features)}
     missing = sorted(tested - set(recorded))
     if missing:
+        names = (feature.name for feature in table.features if not feature.lag)
         raise InputError(
             f"the tree tests the feature {missing[0]!r}, which the recording lacks: "
-            f"it has {', '.join(recorded)}."
+            f"it has {', '.join(names)}."
         )
     columns = [
         _translated(feature, table.features[recorded[name]], table.states[:, recorded[name]])

@@ -23,7 +23,7 @@ from rebt_ros.behavior_tree.learned_tree import (
     Suggestion,
     SuggestionKind,
 )
-from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.schema import LARGEST_LAG, Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import (
     Condition,
@@ -309,7 +309,11 @@ def features(draw: st.DrawFn, name: str | None = None) -> Feature:
     categories = draw(st.lists(names, min_size=least, max_size=most, unique=True))
     source = draw(st.none() | st.tuples(names, st.integers(0, 1000)))
     topic, index = (None, None) if source is None else source
-    return Feature(draw(names) if name is None else name, kind, tuple(categories), topic, index)
+    lag = 0 if index is None else draw(st.integers(0, LARGEST_LAG))
+    if lag and draw(st.booleans()):
+        topic = None
+    called = draw(names) if name is None else name
+    return Feature(called, kind, tuple(categories), topic, index, lag)
 
 
 def _conditions_on(

@@ -258,6 +258,14 @@ Change = Callable[[dict[str, Any]], object]
         (lambda d: d["features"][0].update(categories=["a"]), "contradicts itself"),
         (lambda d: d["features"][3].pop("categories"), "contradicts itself"),
         (lambda d: d["features"][0].update(topic="state"), "contradicts itself"),
+        (lambda d: d["features"][0].update(index=1), "contradicts itself"),
+        (lambda d: d["features"][0].update(lag=1), "looks back without an index"),
+        (
+            lambda d: d["features"][0].update(index=1, lag=0),
+            "document.features[0].lag must be a whole number from 1 to 20, not 0.",
+        ),
+        (lambda d: d["features"][0].update(index=1, lag=21), "from 1 to 20, not 21."),
+        (lambda d: d["features"][0].update(index=1, lag=True), "from 1 to 20, not True."),
         (
             lambda d: d["features"].append(dict(d["features"][0])),
             "two features have the same name",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -287,6 +288,37 @@ def test_a_swapped_tree_knows_what_was_done_before(domain: int, peer: Peer, tmp_
         _publish(peer, _learned(second))
         robot.obeys("turn")
         assert "go" not in {one.data for one in robot.commands}
+
+
+def test_a_tree_looks_back_at_ticks_since_it_was_last_halted_or_swapped(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    known_before = Condition(Literal(Threshold("x[t-1]", 1e6)))
+    lagged = Feature("x[t-1]", topic="state", index=1, lag=1)
+    learned = replace(
+        _learned(Selector((GO, TURN))),
+        features=(lagged,),
+        tree=Selector((Sequence((known_before, GO)), TURN)),
+    )
+    parameters = {"enabled": True, "publish": "on_change", "rate": 100.0, "state_timeout": 2.0}
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        _publish(peer, learned)
+        robot = Robot(peer)
+
+        def did(times: int) -> None:
+            expected = ["turn", "go"] * times
+            robot.until(lambda: [one.data for one in robot.commands] == expected, f"{expected}")
+
+        did(1)
+        assert peer.call("/executor/enable", False).success
+        assert peer.call("/executor/enable", True).success
+        did(2)
+        # No state for a while.
+        peer.diagnostics.clear()
+        _status(peer, "waiting for state")
+        did(3)
+        _publish(peer, replace(learned, actions=(*learned.actions, STOP)))
+        did(4)
 
 
 def test_snapshots_are_sent_when_something_changed(domain: int, peer: Peer, tmp_path: Path) -> None:

@@ -161,12 +161,13 @@ def test_options_are_read_at_each_call(domain: int, peer: Peer, tmp_path: Path) 
     with NodeProcess("learner_node", domain, tmp_path):
         trees = peer.listen(String, "behavior_tree", LATCHED)
         assert peer.call("/learner/relearn").success
-        _set(peer, root="parallel", max_depth=3, ccp_alpha=0.0, categorical_features=["y"])
+        _set(peer, root="parallel", max_depth=3, ccp_alpha=0.0, categorical_features=["y"], lags=2)
         assert peer.call("/learner/relearn").success
         learned = _latest(peer, trees, 2)
         assert learned.provenance.root.value == "parallel"
         assert learned.provenance.max_depth == 3
         assert learned.features[1].categories == ("0", "1", "2", "3", "4", "5", "6")
+        assert [feature.lag for feature in learned.features] == [0, 0, 1, 1, 2, 2]
         _set(peer, categorical_features=["z"])
         answer = peer.call("/learner/relearn")
         assert (answer.success, "no feature 'z'" in answer.message) == (False, True)

@@ -148,6 +148,8 @@ def test_demonstrations_without_features_are_decided_by_their_majority() -> None
         {"ccp_alpha": -1.0},
         {"test_fraction": 1.0},
         {"random_state": -1},
+        {"lags": -1},
+        {"lags": 21},
     ],
 )
 def test_options_out_of_range_are_refused_by_name(wrong: dict[str, float]) -> None:

@@ -79,3 +79,21 @@ def test_freshness_ends_with_the_timeout_and_with_a_clock_set_back() -> None:
     assert inputs.stale(1100) == {}
     assert set(inputs.stale(1101)) == {"pose", "place"}
     assert set(inputs.stale(999)) == {"pose", "place"}
+
+
+def test_a_tree_that_tests_a_lagged_feature_reads_its_source_and_looks_back_until_reset() -> None:
+    features = (Feature("other"), Feature("x[t-1]", index=3, lag=1))
+    tree = Selector((Sequence((Condition(Literal(Threshold("x[t-1]", 0.5))), TURN)), GO))
+    provenance = Provenance(1, 9, 0.0, 5, 0.0, Root.SELECTOR, False, Figures(0, None, None, 0))
+    inputs = TreeInputs(LearnedTree(features, (GO, TURN), tree, provenance), "table", timeout=100)
+    assert inputs.topics == ("table",)
+    with pytest.raises(BadMessageError):
+        inputs.accept("table", Message((0.0, 0.0, 0.0), 0))
+    seen: list[float] = []
+    for tick, value in enumerate((0.25, 0.5, 0.75)):
+        inputs.accept("table", Message((0.0, 0.0, 0.0, value), tick))
+        seen.append(inputs.state()[1])
+    assert math.isnan(seen[0])
+    assert seen[1:] == [0.25, 0.5]
+    inputs.reset()
+    assert math.isnan(inputs.state()[1])

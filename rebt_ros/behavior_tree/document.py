@@ -26,7 +26,7 @@ from rebt_ros.behavior_tree.learned_tree import (
     Suggestion,
     SuggestionKind,
 )
-from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.schema import LARGEST_LAG, Feature, FeatureKind
 from rebt_ros.errors import DocumentError
 from rebt_ros.logic.conditions import (
     Condition,
@@ -165,7 +165,11 @@ def _encode_feature(feature: Feature) -> Json:
     if feature.categories:
         encoded["categories"] = list(feature.categories)
     if feature.topic is not None:
-        encoded |= {"topic": feature.topic, "index": feature.index}
+        encoded["topic"] = feature.topic
+    if feature.index is not None:
+        encoded["index"] = feature.index
+    if feature.lag:
+        encoded["lag"] = feature.lag
     return encoded
 
 
@@ -264,13 +268,16 @@ class _Place:
             self.refuse(f"a number from {least:g} to {most:g}" if bounded else "a finite number")
         return number
 
-    def whole(self, least: int = 0) -> int:
+    def whole(self, least: int = 0, most: int | None = None) -> int:
         number = self.value
         if isinstance(number, float) and number.is_integer():
             # JSON does not tell 2.0 from 2.
             number = int(number)
+        expected = f"of at least {least}" if most is None else f"from {least} to {most}"
         if isinstance(number, bool) or not isinstance(number, int) or number < least:
-            self.refuse(f"a whole number of at least {least}")
+            self.refuse(f"a whole number {expected}")
+        if most is not None and number > most:
+            self.refuse(f"a whole number {expected}")
         return number
 
     def truth(self) -> bool:
@@ -312,7 +319,7 @@ def _learned_tree(place: _Place) -> LearnedTree:
 
 
 def _feature(place: _Place) -> Feature:
-    fields = place.fields("name", "kind", optional=("categories", "topic", "index"))
+    fields = place.fields("name", "kind", optional=("categories", "topic", "index", "lag"))
     categories = fields["categories"].items(_Place.text) if "categories" in fields else ()
     return Feature(
         fields["name"].text(),
@@ -320,6 +327,7 @@ def _feature(place: _Place) -> Feature:
         categories,
         fields["topic"].text() if "topic" in fields else None,
         fields["index"].whole() if "index" in fields else None,
+        fields["lag"].whole(1, LARGEST_LAG) if "lag" in fields else 0,
     )
 
 

@@ -7,6 +7,7 @@ py_trees' blackboard, which is one for the whole process, is not used.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -240,6 +241,8 @@ class _Command(py_trees.behaviour.Behaviour):
 class StateEncoder:
     """Turns the latest messages of the state topics into the state that a tree reads.
 
+    Lagged features are read from a sliding window over the last ticks: a tick stands for a row.
+
     Args:
         features: The learned tree's features.
         default_topic: Topic of features that came from a table, in their order there.
@@ -262,6 +265,9 @@ class StateEncoder:
             }
             for feature in features
         ]
+        self._past: deque[list[float]] = deque(
+            maxlen=max((feature.lag for feature in features), default=0)
+        )
         self.topics: dict[str, int] = {}
         """The least number of values that each topic must send."""
         for _, topic, index in self._sources:
@@ -270,14 +276,32 @@ class StateEncoder:
     def encode(self, latest: Mapping[str, Sequence[float]]) -> list[float]:
         """The values of all features; NaN for a category that was never shown.
 
+        To be called once per tick, as what it is given is what lagged features look back at; they
+        are NaN for as many ticks as they look back.
+
         Args:
             latest: The newest message of every topic in `topics`, of at least that length.
         """
-        state = [latest[topic][index] for _, topic, index in self._sources]
+        # Of a lagged feature, what its source holds now.
+        present = [latest[topic][index] for _, topic, index in self._sources]
         for place, (feature, _, _) in enumerate(self._sources):
             if feature.kind is FeatureKind.CATEGORICAL:
-                state[place] = self._codes[place].get(state[place], math.nan)
+                present[place] = self._codes[place].get(present[place], math.nan)
+        state = [
+            self._at(feature.lag, place, present)
+            for place, (feature, _, _) in enumerate(self._sources)
+        ]
+        self._past.appendleft(present)
         return state
+
+    def reset(self) -> None:
+        """Forgets the ticks before, as at the start of a demonstration."""
+        self._past.clear()
+
+    def _at(self, lag: int, place: int, present: list[float]) -> float:
+        if not lag:
+            return present[place]
+        return self._past[lag - 1][place] if lag <= len(self._past) else math.nan
 
 
 def _number(text: str) -> bool:

@@ -139,6 +139,14 @@ def _parser() -> argparse.ArgumentParser:
     learning.add_argument(
         "--random-state", type=int, default=defaults.random_state, help="default: %(default)s"
     )
+    learning.add_argument(
+        "--lags",
+        type=int,
+        default=defaults.lags,
+        metavar="N",
+        help="also learn from what each feature was 1 to N rows before; for evenly spaced rows, "
+        "and then the executor's rate must be theirs (default: %(default)s)",
+    )
     for kind in FeatureKind:
         learning.add_argument(
             f"--{kind.value}",
@@ -178,6 +186,7 @@ def _options(parsed: argparse.Namespace) -> LearnOptions:
         attach=tuple(parsed.attach),
         psa_choice=parsed.psa_as,
         random_state=parsed.random_state,
+        lags=parsed.lags,
     )
 
 

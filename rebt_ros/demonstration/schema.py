@@ -8,12 +8,17 @@ categorical
     One of a list of categories; tables hold its position in that list.
 
 A missing value is NaN in a table, whatever the kind.
+
+A lagged feature is the value that another one, its source, had some rows before (see `lags`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+
+#: How many rows a feature may look back.
+LARGEST_LAG = 20
 
 
 class FeatureKind(Enum):
@@ -29,7 +34,8 @@ class Feature:
     """A named column of the state.
 
     Raises:
-        ValueError: A categorical feature without categories, or another one with some.
+        ValueError: A categorical feature without categories, or another one with some; or a lagged
+            one that does not say where its source stands.
     """
 
     name: str
@@ -39,10 +45,19 @@ class Feature:
     topic: str | None = None
     """State topic that carries the feature; None where it came from a table."""
     index: int | None = None
-    """Position in the topic's array."""
+    """Position in the topic's array; of a lagged feature without a topic, its source's place in
+    the table."""
+    lag: int = 0
+    """How many rows before it had this value; topic and index are those of its source."""
 
     def __post_init__(self) -> None:
         if (self.kind is FeatureKind.CATEGORICAL) != bool(self.categories):
             raise ValueError(f"{self.name!r} is {self.kind.value} with {self.categories}")
-        if (self.topic is None) != (self.index is None):
+        if not 0 <= self.lag <= LARGEST_LAG:
+            raise ValueError(f"{self.name!r} looks {self.lag} rows back, not 0 to {LARGEST_LAG}")
+        if self.lag and self.index is None:
+            raise ValueError(f"{self.name!r} looks back without an index that says at what")
+        if not self.lag and (self.topic is None) != (self.index is None):
             raise ValueError(f"{self.name!r} needs both a topic and an index, or neither")
+        if self.topic is not None and self.index is None:
+            raise ValueError(f"{self.name!r} has a topic without an index")

@@ -57,7 +57,13 @@ class ExecutorNode(Node):
         tree_file = declare.text(
             "tree_file", "", "Behavior tree document to begin with; empty for none."
         )()
-        rate = declare.number("rate", 20.0, "Ticks per second.", 0.1, 1000.0)()
+        rate = declare.number(
+            "rate",
+            20.0,
+            "Ticks per second; the recording's sample rate if the tree has lagged features.",
+            0.1,
+            1000.0,
+        )()
         timeout = declare.number(
             "state_timeout", 0.5, "How long a state message is good for (seconds).", 0.001, 3600.0
         )()
@@ -221,10 +227,11 @@ class ExecutorNode(Node):
 
     def _rest(self) -> None:
         """Halts the tree; what it commands next is sent, be it what it commanded last."""
-        if self._resting or self._runtime is None:
+        if self._resting or self._runtime is None or self._inputs is None:
             return
         self._channels.begin_tick()
         self._runtime.halt()
+        self._inputs.reset()
         self._resting = True
         self._channels.rest()
 

@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
+from rebt_ros.demonstration.schema import LARGEST_LAG
 from rebt_ros.errors import RebtError
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
@@ -138,6 +139,14 @@ class LearnerNode(Node):
             ),
             "refit": declare.flag(
                 "refit", True, "Whether to learn from all rows once it is judged.", fixed=False
+            ),
+            "lags": declare.integer(
+                "lags",
+                0,
+                "How many rows each feature looks back; record with a sample rate for it.",
+                0,
+                LARGEST_LAG,
+                fixed=False,
             ),
             "random_state": declare.integer(
                 "random_state",

@@ -100,8 +100,15 @@ class TreeInputs:
         return stale
 
     def state(self) -> Sequence[float]:
-        """The encoded state for `TreeRuntime.tick`, once every topic has sent a message."""
+        """The encoded state for `TreeRuntime.tick`, once every topic has sent a message.
+
+        To be called once per tick: lagged features look back at what it returned before.
+        """
         values = self._encoder.encode({topic: one.values for topic, one in self._latest.items()})
         for place, value in zip(self._read, values, strict=True):
             self._state[place] = value
         return self._state
+
+    def reset(self) -> None:
+        """Empties the window of lagged features, as the ticks to come do not follow the last."""
+        self._encoder.reset()
