@@ -16,6 +16,7 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.errors import InputError
 from rebt_ros.family.files import (
     channel_directories,
     clear_family,
@@ -33,6 +34,9 @@ from rebt_ros.selection import JudgedLevels
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.inputs import InputOptions, load
 from rebt_ros.storage.tree_file import read_tree
+
+#: So many different ones can be actions even where each was shown once or twice.
+_FEW_ACTIONS = 20
 
 #: Packages whose versions can change a result.
 _DECIDING_PACKAGES = ("numpy", "scikit-learn", "pyeda", "py_trees")
@@ -88,10 +92,11 @@ def learn(
     loaded = load([Path(one) for one in inputs], reading or InputOptions())
     tables = tabulate(loaded.demonstrations, declared)
     learning = _part(progress, 0.0, _LEARNING_SHARE) if levels else progress
+    for table in tables:
+        _refuse_what_are_no_actions(table)
     learnings = pipeline.learn_channels(tables, options, learning)
-    doubts = (doubt for table in tables for doubt in _doubts(table))
     further = (note for learning in learnings for note in learning.notes)
-    notes = (*loaded.notes, *doubts, *further)
+    notes = (*loaded.notes, *further)
     result = OfflineLearning(pipeline.side_by_side(learnings), learnings, notes)
     if out is not None:
         writing = _part(progress, _LEARNING_SHARE, 1.0)
@@ -126,11 +131,12 @@ def replay(
     return replay_demonstrations(learned, loaded.demonstrations)
 
 
-def _doubts(table: DemonstrationTable) -> Iterator[str]:
-    if len(table.actions) * 2 > len(table) > 2:
-        yield (
-            f"{len(table.actions)} different actions in {len(table)} rows do not look like "
-            f"actions ({', '.join(table.actions[:3])}, …); is another column or topic meant"
+def _refuse_what_are_no_actions(table: DemonstrationTable) -> None:
+    if len(table.actions) > _FEW_ACTIONS and len(table.actions) * 2 > len(table):
+        raise InputError(
+            f"{len(table.actions)} different actions in {len(table)} rows do not look like actions "
+            f"({', '.join(table.actions[:3])}, …): name the column with --label, or the topic with "
+            "--action-topic."
         )
 
 

@@ -21,7 +21,7 @@ from rebt_ros.demonstration.table import DemonstrationTable
 _FOLDS = 5
 #: A LAT-augmented tree has to be converted and run through the rows to be judged: so many levels
 #: are, and no larger trees than that, which nobody could read anyway.
-_MOST_LEVELS_RUN, _MOST_LEAVES_RUN = 12, 64
+_MOST_LEVELS_RUN, _MOST_LEAVES_RUN = 12, 32
 
 #: Makes a behavior tree of a pruned decision tree.
 Convert = Callable[[TrainedTree], nodes.Node]

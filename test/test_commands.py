@@ -150,6 +150,7 @@ def test_replay_refuses_a_recording_without_the_features_of_the_tree(
     [
         (("learn", "nowhere.csv"), "nowhere.csv does not exist"),
         (("learn", "TABLE", "--label", "nix"), "'nix'"),
+        (("learn", "NUMBERS"), "do not look like actions"),
         (("learn", "TABLE", "--delta", "2"), "delta must lie between 0 and 1"),
         (("learn", "TABLE", "--max-depth", "0"), "max_depth must be at least 1"),
         (("learn", "TABLE", "--root", "sequence"), "Sequence root"),
@@ -163,7 +164,9 @@ def test_replay_refuses_a_recording_without_the_features_of_the_tree(
 def test_what_cannot_be_done_is_said_in_one_sentence_with_exit_code_1(
     table: Path, tmp_path: Path, arguments: tuple[str, ...], said: str
 ) -> None:
-    given = [table if one == "TABLE" else one for one in arguments]
+    numbers = tmp_path / "numbers.csv"
+    numbers.write_text("x,y\n" + "".join(f"{one},{one / 7}\n" for one in range(50)))
+    given = [{"TABLE": table, "NUMBERS": numbers}.get(one, one) for one in arguments]
     extra = ["--out", tmp_path / "out"] if arguments[0] == "learn" else []
     done = run(*given, *extra)
     assert done.returncode == 1

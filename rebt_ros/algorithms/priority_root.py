@@ -29,10 +29,11 @@ from rebt_ros.logic.minimize import minimize
 
 #: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and
 #: entanglement make espresso take minutes there.
-MOST_LEAVES_BY_DOMAIN = 48
+MOST_LEAVES_BY_DOMAIN = 40
 
-#: Up to this many rules the best order is found, beyond it the order that is best step by step.
-_MOST_RULES_IN_ANY_ORDER = 6
+#: Up to so many rules the best order is found, then the order that is best step by step; yet more
+#: rules are ordered by their number of leaves, as a search would take a minimization per pair.
+_MOST_RULES_IN_ANY_ORDER, _MOST_RULES_STEP_BY_STEP = 6, 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class Reductions:
     """The reductions past the paper, each of which can be left out."""
 
     domain: bool = True
-    """Infeasible combinations of conditions are don't-cares, in trees of up to 48 leaves."""
+    """Infeasible combinations of conditions are don't-cares, in trees of up to 40 leaves."""
     repeated_factoring: bool = True
     """Factoring is repeated instead of done once."""
     priority: bool = True
@@ -81,7 +82,11 @@ def reduced_tree(
         return _child(rules[rule].actions, float_reduction(minimized), reductions)
 
     if reductions.priority and root is Root.SELECTOR:
-        order = _best_order(len(rules), lambda rule, earlier: nodes.size(child(rule, earlier)))
+        order = (
+            _best_order(len(rules), lambda rule, earlier: nodes.size(child(rule, earlier)))
+            if len(rules) <= _MOST_RULES_STEP_BY_STEP
+            else sorted(range(len(rules)), key=lambda rule: len(rules[rule].dnf))
+        )
         trees = [child(rule, frozenset(order[:place])) for place, rule in enumerate(order)]
     else:
         trees = [child(rule, frozenset()) for rule in range(len(rules))]
