@@ -33,7 +33,10 @@ setup(
         "rosbags>=0.11",
         "scikit-learn>=1.4",
     ],
-    extras_require={"test": ["hypothesis", "jsonschema>=4.10", "pytest"]},
+    extras_require={
+        "test": ["hypothesis", "jsonschema>=4.10", "pytest"],
+        "upsampling": ["imbalanced-learn>=0.12"],
+    },
     entry_points={
         "console_scripts": [
             f"demo = {PACKAGE}.commands.demo:main",

@@ -16,6 +16,7 @@ from rebt_ros.behavior_tree.dot import render_dot
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.options import LearnOptions
@@ -123,9 +124,10 @@ def _write(
         "inputs": list(inputs),
         "notes": list(result.notes),
         "random_state": options.random_state,
+        "upsample": options.upsample.value,
         "test_fraction": options.test_fraction,
         "refit": options.refit,
-        "versions": _versions(),
+        "versions": _versions(options),
     }
     text = json.dumps(summary, indent=2, ensure_ascii=False)
     write_text_atomically(directory / "summary.json", text + "\n")
@@ -197,9 +199,10 @@ def _levels(levels: JudgedLevels | None) -> Iterator[dict[str, float]]:
             yield {"ccp_alpha": alpha, "own_history_agreement": mean, "standard_error": error}
 
 
-def _versions() -> dict[str, str]:
+def _versions(options: LearnOptions) -> dict[str, str]:
     versions = {"python": platform.python_version()}
-    for package in _DECIDING_PACKAGES:
+    further = () if options.upsample is Upsampling.NONE else ("imbalanced-learn",)
+    for package in (*_DECIDING_PACKAGES, *further):
         try:
             versions[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:

@@ -1,7 +1,8 @@
 """CSV tables as demonstrations: one table is one demonstration, one row is one action event.
 
-Where several columns hold actions, a row is one event on each of their channels.  A column is numeric where all its cells are numbers, binary where they all say true or false, and
-categorical otherwise.  An empty cell is a missing value.
+A column is numeric where all its cells are numbers, binary where they all say true or false, and
+categorical otherwise.  An empty cell is a missing value.  Where several columns hold actions, a
+row is one event on each of their channels.
 """
 
 from __future__ import annotations
