@@ -119,7 +119,7 @@ def _sampler() -> Callable[..., Any]:
     try:
         from imblearn.over_sampling import SVMSMOTE
     except ImportError as err:
-        if isinstance(err, ModuleNotFoundError) and err.name == "imblearn":
+        if isinstance(err, ModuleNotFoundError) and (err.name or "").startswith("imblearn"):
             raise OptionError(
                 "upsampling needs imbalanced-learn, which is not installed: run "
                 "'python3 -m pip install imbalanced-learn', or learn without upsampling."
