@@ -36,6 +36,7 @@ setup(
     extras_require={
         "pictures": ["matplotlib>=3.6"],
         "test": ["hypothesis", "jsonschema>=4.10", "pytest"],
+        "upsampling": ["imbalanced-learn>=0.12"],
     },
     entry_points={
         "console_scripts": [

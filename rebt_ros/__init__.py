@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
+    from rebt_ros.decision_tree.upsampling import Upsampling
     from rebt_ros.errors import RebtError
     from rebt_ros.offline import learn, replay
     from rebt_ros.options import LearnOptions, Use
@@ -22,6 +23,7 @@ __all__ = [
     "LearnedTree",
     "RebtError",
     "Root",
+    "Upsampling",
     "Use",
     "learn",
     "replay",
@@ -33,6 +35,7 @@ _HOMES = {
     "LearnedTree": "rebt_ros.behavior_tree.learned_tree",
     "RebtError": "rebt_ros.errors",
     "Root": "rebt_ros.behavior_tree.learned_tree",
+    "Upsampling": "rebt_ros.decision_tree.upsampling",
     "Use": "rebt_ros.options",
     "learn": "rebt_ros.offline",
     "replay": "rebt_ros.offline",

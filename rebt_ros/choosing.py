@@ -76,6 +76,7 @@ def _unjudged(table: DemonstrationTable, options: LearnOptions) -> Policy:
         last_action=options.last_action is Use.ALWAYS,
         max_depth=options.max_depth,
         random_state=options.random_state,
+        upsample=options.upsample,
     )
     reason = f"{len(table)} rows are too few to choose by: the tree is not pruned."
     ccp_alpha = options.ccp_alpha or 0.0
@@ -91,6 +92,7 @@ def _last_action_and_level(
             last_action=last_action,
             max_depth=options.max_depth,
             random_state=options.random_state,
+            upsample=options.upsample,
         )
 
     def run(judged: CrossValidation) -> JudgedLevels:

@@ -14,6 +14,7 @@ from rebt_ros import pipeline
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.text import render_text
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError
@@ -174,10 +175,11 @@ def _write_summary(
         "inputs": list(inputs),
         "notes": list(result.notes),
         "random_state": options.random_state,
+        "upsample": options.upsample.value,
         "test_fraction": options.test_fraction,
         "refit": options.refit,
         "lags": options.lags,
-        "versions": _versions(),
+        "versions": _versions(options),
     }
     text = json.dumps(summary, indent=2, ensure_ascii=False)
     write_text_atomically(directory / "summary.json", text + "\n")
@@ -257,9 +259,10 @@ def _levels(levels: JudgedLevels | None) -> Iterator[dict[str, float]]:
             yield {"ccp_alpha": alpha, "own_history_agreement": mean, "standard_error": error}
 
 
-def _versions() -> dict[str, str]:
+def _versions(options: LearnOptions) -> dict[str, str]:
     versions = {"python": platform.python_version()}
-    for package in _DECIDING_PACKAGES:
+    further = () if options.upsample is Upsampling.NONE else ("imbalanced-learn",)
+    for package in (*_DECIDING_PACKAGES, *further):
         try:
             versions[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:

@@ -9,6 +9,7 @@ from enum import Enum
 from rebt_ros.algorithms.priority_root import ALL_REDUCTIONS, Reductions
 from rebt_ros.algorithms.suggestions import PsaChoice
 from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.schema import LARGEST_LAG
 from rebt_ros.errors import OptionError
 
@@ -50,9 +51,11 @@ class LearnOptions:
     refit: bool = False
     """Whether the tree is learned from all rows in the end, once it has been judged."""
     random_state: int = 0
-    """Decides between equally good splits."""
+    """Decides between equally good splits, and which rows are made up."""
     lags: int = 0
     """How many rows each state feature looks back, 0 to 20; rows should be evenly spaced."""
+    upsample: Upsampling = Upsampling.NONE
+    """Rows that decision trees are fitted to beside those shown; none is ever judged on them."""
     attach: tuple[str, ...] = ()
     """Ids of the suggestions to attach, or `ALL`."""
     psa_choice: PsaChoice | None = None

@@ -200,7 +200,12 @@ def learn_from(
     learned = as_learned(table, trained, tree, policy.ccp_alpha, figures, options)
     progress("done", 1.0)
     return Learning(
-        replace(learned, suggestions=suggestions), trained, table, held_out, policy, notes
+        replace(learned, suggestions=suggestions),
+        trained,
+        table,
+        held_out,
+        policy,
+        (*trained.notes, *notes),
     )
 
 
@@ -255,6 +260,7 @@ def _refit(table: DemonstrationTable, options: LearnOptions, policy: Policy) -> 
         max_depth=options.max_depth,
         ccp_alpha=policy.ccp_alpha,
         random_state=options.random_state,
+        upsample=options.upsample,
     )
 
 

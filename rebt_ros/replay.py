@@ -75,7 +75,7 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tup
         raise InputError(
             f"the recording has actions on {', '.join(map(repr, tables))} but not on "
             f"{', '.join(map(repr, policies))}, for which the tree decides: "
-            "choose the action topic."
+            "choose the action topics, or the label columns of a table."
         )
     return tuple(
         _replay(learned, channel, policies[channel], tables[channel]) for channel in common

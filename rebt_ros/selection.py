@@ -16,6 +16,7 @@ from rebt_ros import evaluation
 from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.table import DemonstrationTable
 
 _FOLDS = 5
@@ -75,7 +76,8 @@ class CrossValidation:
         table: At least two rows.
         last_action: Whether the trees may test LAT.
         max_depth: Splits on the longest path; None for no limit.
-        random_state: Decides between equally good splits.
+        random_state: Decides between equally good splits, and which rows are made up.
+        upsample: Rows to fit the trees to beside those of the table; none is judged on them.
     """
 
     def __init__(
@@ -85,10 +87,15 @@ class CrossValidation:
         last_action: bool,
         max_depth: int | None,
         random_state: int,
+        upsample: Upsampling = Upsampling.NONE,
     ) -> None:
         def fitted(rows: DemonstrationTable) -> FittedTree:
             return fit(
-                rows, last_action=last_action, max_depth=max_depth, random_state=random_state
+                rows,
+                last_action=last_action,
+                max_depth=max_depth,
+                random_state=random_state,
+                upsample=upsample,
             )
 
         fold = folds(table)

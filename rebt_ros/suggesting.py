@@ -50,6 +50,7 @@ def suggest(
             last_action=True,
             max_depth=options.max_depth,
             random_state=options.random_state,
+            upsample=options.upsample,
         ).at(ccp_alpha)
     )
     rules = dt_to_rules_psa(with_lat.tree, options.delta)

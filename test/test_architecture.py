@@ -63,6 +63,7 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 
 #: Libraries with a home: the only modules that import them.
 HOMES: Final = {
+    "imblearn": ("rebt_ros.decision_tree.upsampling",),
     "jsonschema": (),
     "joblib": ("rebt_ros.commands.bench_*",),
     "matplotlib": ("rebt_ros.pictures.*",),
@@ -264,5 +265,5 @@ def test_offline_commands_need_no_ros(command: str) -> None:
 @pytest.mark.parametrize("node", ["recorder_node", "executor_node"])
 def test_nodes_of_the_robot_load_nothing_that_only_learning_needs(node: str) -> None:
     loaded = _run(f"import sys, rebt_ros.ros.{node}; print(*sys.modules)").split()
-    heavy = {"jsonschema", "pyeda", "rosbags", "scipy", "sklearn"}
+    heavy = {"imblearn", "jsonschema", "pyeda", "rosbags", "scipy", "sklearn"}
     assert heavy & {name.split(".")[0] for name in loaded} == set()

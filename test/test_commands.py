@@ -119,6 +119,31 @@ def test_learn_counts_the_intervals_unless_they_are_kept_apart(tmp_path: Path) -
     assert sizes["default"] < sizes["--no-intervals"] < sizes["--paper"]
 
 
+def test_two_label_columns_are_learned_and_replayed_as_two_channels(tmp_path: Path) -> None:
+    table = tmp_path / "table.csv"
+    rows = (
+        f"{'grasp' if near else 'open'},{near / 10},{'wait' if blocked else 'go'},{blocked}\n"
+        for _ in range(6)
+        for near in (0, 3, 7)
+        for blocked in (0, 1)
+    )
+    table.write_text("arm,distance,base,blocked\n" + "".join(rows))
+    labels = ("--label", "arm", "--label", "base")
+    done = run("learn", table, *labels, "--out", tmp_path, "--test-fraction", "0")
+    assert done.returncode == 0, done.stderr
+    tree = read_tree(tmp_path / "tree.json")
+    assert [feature.name for feature in tree.features] == ["distance", "blocked"]
+    assert {(one.channel, one.label) for one in tree.actions} == {
+        ("arm", "grasp"),
+        ("arm", "open"),
+        ("base", "go"),
+        ("base", "wait"),
+    }
+    done = run("replay", tmp_path / "tree.json", table, *labels)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("100.00%") >= 2
+
+
 def test_replay_shows_agreement_confusion_and_disagreements(learned: Path, table: Path) -> None:
     other = table.parent / "other.csv"
     other.write_text(TABLE.replace("0.2,0,turn", "0.2,0,go", 1))
@@ -151,6 +176,7 @@ def test_replay_refuses_a_recording_without_the_features_of_the_tree(
         (("learn", "nowhere.csv"), "nowhere.csv does not exist"),
         (("learn", "TABLE", "--label", "nix"), "'nix'"),
         (("learn", "NUMBERS"), "do not look like actions"),
+        (("learn", "TABLE", "--label", "docked", "--label", "docked"), "'docked' is named twice"),
         (("learn", "TABLE", "--delta", "2"), "delta must lie between 0 and 1"),
         (("learn", "TABLE", "--max-depth", "0"), "max_depth must be at least 1"),
         (("learn", "TABLE", "--root", "sequence"), "Sequence root"),

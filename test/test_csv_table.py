@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
 from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError
 from rebt_ros.storage.csv_table import read_csv
 
@@ -100,7 +101,7 @@ def test_rows_without_an_action_are_left_out_with_one_note(table):
 
 
 def test_the_label_column_may_stand_anywhere(table):
-    shown = read_csv(table("x,act,y\n1,go,2\n3,turn,4\n"), label="act").demonstration
+    shown = read_csv(table("x,act,y\n1,go,2\n3,turn,4\n"), labels=["act"]).demonstration
     assert [one.name for one in shown.features] == ["x", "y"]
     assert labels(shown) == ["go", "turn"]
 
@@ -112,18 +113,95 @@ def test_a_label_keeps_its_text_exactly(table):
 
 def test_an_unknown_label_column_is_refused_with_the_columns_there_are(table):
     with pytest.raises(InputError, match="no column 'nope': the columns are x, y, a"):
-        read_csv(table("x,y,a\n1,2,go\n"), label="nope")
+        read_csv(table("x,y,a\n1,2,go\n"), labels=["nope"])
 
 
 def test_only_the_first_columns_are_listed(table):
     header = ",".join(f"c{index}" for index in range(20))
     with pytest.raises(InputError, match=r"c0, c1, c2, c3, c4, c5, c6, c7, \.\.\.\.$"):
-        read_csv(table(header + "\n" + ",".join("1" * 20) + "\n"), label="nope")
+        read_csv(table(header + "\n" + ",".join("1" * 20) + "\n"), labels=["nope"])
 
 
-@pytest.mark.parametrize("label", [None, "x2", "2"])
-def test_columns_without_a_header_are_named_by_their_index(table, label):
-    shown = read_csv(table("1,2,go\n3,4,turn\n"), label=label, header=False).demonstration
+def events(demonstration):
+    """Channel, action and state of each row."""
+    channels = [demonstration.channels[code] for code in demonstration.channel]
+    return list(zip(channels, labels(demonstration), demonstration.states.tolist(), strict=True))
+
+
+def test_several_label_columns_are_a_channel_each(table):
+    text = "base,x,arm\ngo,1,open\n,2,open\nturn,3, \n,4,\ngo,5,close\n"
+    read = read_csv(table(text), labels=["base", "arm"])
+    shown = read.demonstration
+    assert [one.name for one in shown.features] == ["x"]
+    assert shown.channels == ("arm", "base")
+    assert events(shown) == [
+        ("base", "go", [1]),
+        ("arm", "open", [1]),
+        ("arm", "open", [2]),
+        ("base", "turn", [3]),
+        ("base", "go", [5]),
+        ("arm", "close", [5]),
+    ]
+    assert shown.stamps.tolist() == [0, 0, 1, 2, 4, 4]
+    assert read.notes == (
+        "2 of 5 rows have no action in column 'base' and are left out of its channel",
+        "2 of 5 rows have no action in column 'arm' and are left out of its channel",
+    )
+
+
+def test_each_channel_of_a_table_has_its_own_last_action(table):
+    text = "x,arm,base\n1,open,go\n2,,turn\n3,close,go\n4,open,\n"
+    shown = read_csv(table(text), labels=["arm", "base"]).demonstration
+    arm, base = tabulate([shown])
+    assert (arm.channel, base.channel) == ("arm", "base")
+    assert (arm.actions, arm.last.tolist()) == (("close", "open"), [-1, 1, 0])
+    assert (base.actions, base.last.tolist()) == (("go", "turn"), [-1, 0, 1])
+
+
+def test_stamps_and_positions_serve_several_labels(table):
+    shown = read_csv(table("stamp,a,b\n7,go,up\n9,,up\n"), labels=["a"]).demonstration
+    assert shown.stamps.tolist() == [7]
+    shown = read_csv(table("stamp,x,a,b\n7,1,go,up\n9,2,,up\n"), labels=["b", "a"]).demonstration
+    assert shown.stamps.tolist() == [7, 7, 9]
+    shown = read_csv(table("1,go,up\n2,turn,up\n"), labels=["1", "x2"], header=False).demonstration
+    assert shown.channels == ("x1", "x2")
+    assert [one.name for one in shown.features] == ["x0"]
+
+
+def test_two_labels_in_a_table_of_numbers_leave_the_first_line_data(table):
+    read = read_csv(table("0.4,1,0\n0.5,2,0\n"), labels=["x1", "x2"])
+    assert events(read.demonstration)[:2] == [("x1", "1", [0.4]), ("x2", "0", [0.4])]
+    assert read.notes == ("the first line holds data, so the columns are named x0, x1, and so on",)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "message"),
+    [
+        (["a", "a"], "column 'a' is named twice as a label"),
+        (["a", "nope"], "no column 'nope': the columns are x, a, b, c"),
+        (["a", "c"], "column 'c' holds no action"),
+        (["x", "a", "b", "c"], "holds no action"),
+    ],
+)
+def test_label_columns_that_cannot_be_used_are_refused(table, wanted, message):
+    with pytest.raises(InputError, match=message) as caught:
+        read_csv(table("x,a,b,c\n1,go,up,\n2,turn,up,\n"), labels=wanted)
+    assert str(caught.value).endswith(".")
+
+
+def test_an_action_in_any_label_column_must_be_printable(table):
+    with pytest.raises(InputError, match=r"line 3: the action 'u.*p' must consist of printable"):
+        read_csv(table("x,a,b\n1,go,up\n2,,u\tp\n"), labels=["a", "b"])
+
+
+def test_a_table_of_labels_only_is_refused(table):
+    with pytest.raises(InputError, match="no column beside the actions"):
+        read_csv(table("a,b\ngo,up\n"), labels=["a", "b"])
+
+
+@pytest.mark.parametrize("labels", [[], ["x2"], ["2"]])
+def test_columns_without_a_header_are_named_by_their_index(table, labels):
+    shown = read_csv(table("1,2,go\n3,4,turn\n"), labels=labels, header=False).demonstration
     assert [one.name for one in shown.features] == ["x0", "x1"]
     assert len(shown) == 2
 
@@ -228,7 +306,7 @@ def test_every_bit_of_a_number_and_every_label_survives(tmp_path_factory, rows):
 @pytest.mark.skipif(not SHARED.exists(), reason="third-party data is not beside the checkout")
 class TestRealData:
     def test_the_robot_tutor(self):
-        read = read_csv(SHARED / "data" / "tutor.csv", label="/robot_dialogue")
+        read = read_csv(SHARED / "data" / "tutor.csv", labels=["/robot_dialogue"])
         assert read.notes == ("186 of 1000 rows have no action and are left out",)
         assert len(read.demonstration) == 814
         kinds = {one.name: one.kind for one in read.demonstration.features}

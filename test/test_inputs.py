@@ -63,7 +63,7 @@ def test_every_input_is_read_as_what_it_is(tmp_path):
     other = write_bag(tmp_path / "other")
     loaded = load(
         [table, tmp_path / "several", bag, single, other / "other.db3"],
-        InputOptions(label="action", state_topics=(StateTopic("s", ("front",)),)),
+        InputOptions(labels=("action",), state_topics=(StateTopic("s", ("front",)),)),
     )
     assert names(loaded) == [
         "table.csv",
@@ -79,7 +79,7 @@ def test_every_input_is_read_as_what_it_is(tmp_path):
 
 def test_notes_say_which_demonstration_they_are_about(tmp_path):
     table = write_table(tmp_path / "table.csv")
-    loaded = load([table], InputOptions(label="action"))
+    loaded = load([table], InputOptions(labels=("action",)))
     assert loaded.notes == ("table.csv: 1 of 3 rows have no action and are left out",)
 
 
@@ -111,7 +111,7 @@ def test_an_option_for_bags_needs_a_bag(tmp_path, options):
     load([table, write_bag(tmp_path / "bag")], options)
 
 
-@pytest.mark.parametrize("options", [InputOptions(label="x"), InputOptions(header=False)])
+@pytest.mark.parametrize("options", [InputOptions(labels=("x",)), InputOptions(header=False)])
 def test_an_option_for_tables_needs_a_table(tmp_path, options):
     with pytest.raises(OptionError, match="no input is a CSV table"):
         load([write_bag(tmp_path / "bag")], options)

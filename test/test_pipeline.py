@@ -179,7 +179,7 @@ def test_the_wall_following_robot_is_learned_without_a_mismatch() -> None:
 
 @pytest.mark.skipif(not TUTOR.exists(), reason="third-party data is not there")
 def test_the_robot_tutor_is_learned_with_its_missing_and_label_free_cells() -> None:
-    result = rebt_ros.learn([TUTOR], reading=InputOptions(label="/robot_dialogue"))
+    result = rebt_ros.learn([TUTOR], reading=InputOptions(labels=("/robot_dialogue",)))
     learned = result.learned
     kinds = {feature.name: feature.kind for feature in learned.features}
     assert learned.provenance.rows == 1000 - 186

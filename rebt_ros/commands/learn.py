@@ -17,6 +17,7 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import add_input_options, input_options, run, use_color
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.errors import OptionError
 from rebt_ros.options import LearnOptions, Use
@@ -147,6 +148,15 @@ def _parser() -> argparse.ArgumentParser:
         help="also learn from what each feature was 1 to N rows before; for evenly spaced rows, "
         "and then the executor's rate must be theirs (default: %(default)s)",
     )
+    learning.add_argument(
+        "--upsample",
+        type=Upsampling,
+        choices=list(Upsampling),
+        default=defaults.upsample,
+        metavar=_values(Upsampling),
+        help="make up rows for rare actions, for decision trees to be fitted to and never judged "
+        "on; svm-smote needs the package imbalanced-learn (default: none)",
+    )
     for kind in FeatureKind:
         learning.add_argument(
             f"--{kind.value}",
@@ -187,6 +197,7 @@ def _options(parsed: argparse.Namespace) -> LearnOptions:
         psa_choice=parsed.psa_as,
         random_state=parsed.random_state,
         lags=parsed.lags,
+        upsample=parsed.upsample,
     )
 
 

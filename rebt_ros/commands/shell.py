@@ -47,7 +47,14 @@ def add_input_options(parser: argparse.ArgumentParser) -> None:
         "directory of them, or a CSV table",
     )
     tables = parser.add_argument_group("CSV tables")
-    tables.add_argument("--label", metavar="COLUMN", help="column of the action (default: last)")
+    tables.add_argument(
+        "--label",
+        action="append",
+        default=[],
+        metavar="COLUMN",
+        help="column of the action; repeatable, each one then is a channel of its own, named "
+        "after its column (default: last)",
+    )
     tables.add_argument(
         "--no-header", action="store_true", help="the first line is a row; columns are x0, x1, …"
     )
@@ -81,7 +88,7 @@ def add_input_options(parser: argparse.ArgumentParser) -> None:
 def input_options(arguments: argparse.Namespace) -> InputOptions:
     """The options that `add_input_options` added."""
     return InputOptions(
-        label=arguments.label,
+        labels=tuple(arguments.label),
         header=not arguments.no_header,
         state_topics=tuple(map(_state_topic, arguments.state_topic)),
         action_topics=tuple(arguments.action_topic),

@@ -24,7 +24,7 @@ from rebt_ros.logic.conditions import (
 )
 
 #: Stands for a missing number: larger than all that are not, as ``missing <= x`` is false.
-_MISSING = float(np.finfo(np.float32).max)
+MISSING = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Number:
     def at_most(self, threshold: float) -> Literal:
         """The literal that holds where the column is at most `threshold`."""
         # No value lies between the largest one that is accepted (1e38) and the missing ones.
-        beyond = threshold > _MISSING / 3
+        beyond = threshold > MISSING / 3
         return Literal(Threshold(self.feature, KNOWN if beyond else exact_threshold(threshold)))
 
 
@@ -76,7 +76,7 @@ def encode(table: DemonstrationTable, last_action: bool) -> Float32Array:
     for index, feature in enumerate(table.features):
         values = table.states[:, index]
         if feature.kind is FeatureKind.NUMERIC:
-            known = np.where(np.isnan(values), _MISSING, values)
+            known = np.where(np.isnan(values), MISSING, values)
             blocks.append(known.astype(np.float32)[:, np.newaxis])
         elif feature.kind is FeatureKind.BINARY:
             blocks.append((values == 1).astype(np.float32)[:, np.newaxis])

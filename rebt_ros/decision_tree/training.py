@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from rebt_ros.behavior_tree.nodes import Action
 from rebt_ros.decision_tree.encoding import Indicator, Number, columns, encode
 from rebt_ros.decision_tree.pruning import PruningPath, pruning_path
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
+from rebt_ros.decision_tree.upsampling import Upsampled, Upsampling, svm_smote
 from rebt_ros.demonstration.table import DemonstrationTable
 
 
@@ -27,6 +29,8 @@ class TrainedTree:
     """Fitted, not pruned."""
     standing: IntArray
     """The node that decides for each node of the classifier: itself, or what it is pruned to."""
+    notes: tuple[str, ...] = ()
+    """What a person should know about the rows that it was fitted to; no full stops."""
 
     def predict(self, table: DemonstrationTable) -> IntArray:
         """scikit-learn's own prediction: positions in ``table.actions``, shape (rows,)."""
@@ -45,6 +49,8 @@ class FittedTree:
     asked: tuple[Number | Indicator, ...]
     """What each column of the encoded table asks."""
     uses_last_action: bool
+    notes: tuple[str, ...] = ()
+    """What a person should know about the rows that it was fitted to; no full stops."""
 
     def at(self, ccp_alpha: float) -> TrainedTree:
         """The tree as pruned at `ccp_alpha`; equal to scikit-learn's own fit with it."""
@@ -56,6 +62,7 @@ class FittedTree:
             self.uses_last_action,
             self.classifier,
             self.path.standing(is_leaf),
+            self.notes,
         )
 
     def agreements(self, table: DemonstrationTable, ccp_alphas: FloatArray) -> FloatArray:
@@ -88,6 +95,7 @@ def fit(
     last_action: bool,
     max_depth: int | None = None,
     random_state: int = 0,
+    upsample: Upsampling = Upsampling.NONE,
 ) -> FittedTree:
     """Fits a decision tree.
 
@@ -95,18 +103,29 @@ def fit(
         table: At least one row.
         last_action: Whether the tree may test LAT.
         max_depth: Splits on the longest path; None for no limit.
-        random_state: Decides between equally good splits.
+        random_state: Decides between equally good splits, and which rows are made up.
+        upsample: Rows to fit the tree to beside those of the table; its leaves count them, too.
+
+    Raises:
+        OptionError: Upsampling needs a package that is not installed.
     """
+    asked = columns(table, last_action)
+    matrix, chosen = encode(table, last_action), table.chosen
+    notes: tuple[str, ...] = ()
+    if upsample is Upsampling.SVM_SMOTE:
+        more = svm_smote(matrix, chosen, asked, random_state)
+        notes = tuple(_notes(table, more))
+        matrix, chosen = more.matrix, more.chosen
     classifier = DecisionTreeClassifier(
         criterion="gini", max_depth=max_depth, random_state=random_state
     )
     with warnings.catch_warnings():
         # Actions are codes here; that there are many does not make this a regression.
         warnings.filterwarnings("ignore", message="The number of unique classes")
-        classifier.fit(encode(table, last_action), table.chosen)
+        classifier.fit(matrix, chosen)
     actions = tuple(Action(label, table.channel) for label in table.actions)
     path = pruning_path(classifier)
-    return FittedTree(classifier, path, actions, columns(table, last_action), last_action)
+    return FittedTree(classifier, path, actions, asked, last_action, notes)
 
 
 def train(
@@ -116,10 +135,25 @@ def train(
     max_depth: int | None = None,
     ccp_alpha: float = 0.0,
     random_state: int = 0,
+    upsample: Upsampling = Upsampling.NONE,
 ) -> TrainedTree:
     """Fits a decision tree and prunes it at `ccp_alpha`; see `fit`."""
-    fitted = fit(table, last_action=last_action, max_depth=max_depth, random_state=random_state)
+    fitted = fit(
+        table,
+        last_action=last_action,
+        max_depth=max_depth,
+        random_state=random_state,
+        upsample=upsample,
+    )
     return fitted.at(ccp_alpha)
+
+
+def _notes(table: DemonstrationTable, more: Upsampled) -> Iterator[str]:
+    added = len(more.chosen) - len(table)
+    yield f"the decision tree was fitted to {added} made-up rows beside the {len(table)} shown"
+    if more.left:
+        names = ", ".join(repr(table.actions[action]) for action in more.left)
+        yield f"too few rows resemble each other to upsample {names}"
 
 
 def _as_data(

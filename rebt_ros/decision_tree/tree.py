@@ -16,7 +16,7 @@ class Leaf:
     """Where a decision path ends."""
 
     distribution: tuple[int, ...]
-    """Training rows of each action, in the order of the tree's actions."""
+    """Training rows of each action, made-up ones among them, in the order of the tree's actions."""
 
     @property
     def most_probable(self) -> int:

@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.schema import LARGEST_LAG
 from rebt_ros.errors import RebtError
 from rebt_ros.ros import lifetime
@@ -154,6 +155,13 @@ class LearnerNode(Node):
                 "Decides between equally good splits.",
                 0,
                 2**32 - 1,
+                fixed=False,
+            ),
+            "upsample": declare.text(
+                "upsample",
+                "none",
+                "Whether rows are made up for rare actions; svm-smote needs imbalanced-learn.",
+                choices=[upsampling.value for upsampling in Upsampling],
                 fixed=False,
             ),
         }

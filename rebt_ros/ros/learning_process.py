@@ -195,6 +195,7 @@ def learn(request: Request) -> Lesson:
     from rebt_ros import pipeline
     from rebt_ros.behavior_tree.document import dumps
     from rebt_ros.behavior_tree.learned_tree import Root
+    from rebt_ros.decision_tree.upsampling import Upsampling
     from rebt_ros.demonstration.schema import FeatureKind
     from rebt_ros.options import LearnOptions, Use
     from rebt_ros.storage.recording import read_recording, recordings
@@ -206,7 +207,12 @@ def learn(request: Request) -> Lesson:
         **dict.fromkeys(request.binary_features, FeatureKind.BINARY),
         **dict.fromkeys(request.categorical_features, FeatureKind.CATEGORICAL),
     }
-    kinds: dict[str, type[Enum]] = {"root": Root, "psa": Use, "last_action": Use}
+    kinds: dict[str, type[Enum]] = {
+        "root": Root,
+        "psa": Use,
+        "last_action": Use,
+        "upsample": Upsampling,
+    }
     chosen: dict[str, Any] = {
         name: kinds[name](value) if name in kinds else value
         for name, value in request.options.items()

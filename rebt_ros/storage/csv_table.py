@@ -1,7 +1,8 @@
 """CSV tables as demonstrations: one table is one demonstration, one row is one action event.
 
 A column is numeric where all its cells are numbers, binary where they all say true or false, and
-categorical otherwise.  An empty cell is a missing value.
+categorical otherwise.  An empty cell is a missing value.  Where several columns hold actions, a
+row is one event on each of their channels.
 """
 
 from __future__ import annotations
@@ -34,19 +35,21 @@ STAMP = "stamp"
 _LISTED = 8
 
 
-def read_csv(path: Path, *, label: str | None = None, header: bool = True) -> Read:
+def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> Read:
     """Reads a CSV table.
 
     Args:
         path: The file: UTF-8, comma separated, one line of column names unless `header` says no.
-        label: Column that holds the actions; without a header its name (`x24`) or its index
+        labels: Columns that hold the actions; without a header their names (`x24`) or indices
             (`24`); by default the last column.
         header: Whether the first line names the columns (`x0`, `x1`, ... if not).  A first line
             that holds data all the same is recognised by its numbers and noted.
 
     Returns:
-        The rows that have an action, on the channel `DEFAULT_CHANNEL`.  Stamps are those of the
-        column `stamp` if it holds integers, else each row's position in the file.
+        The rows that have an action: on the channel `DEFAULT_CHANNEL` where there is one label
+        column; where there are several, each is a channel of its own, named after the column, and
+        a row of the table is one row on each channel that has an action there.  Stamps are those
+        of the column `stamp` if it holds integers, else each row's position in the file.
 
     Raises:
         InputError: The file cannot be read or is not such a table.
@@ -54,45 +57,39 @@ def read_csv(path: Path, *, label: str | None = None, header: bool = True) -> Re
     file = _File(path, read_text(path))
     records = _records(file)
     notes: list[str] = []
-    if header and _first_is_data(records, label):
+    if header and _first_is_data(records, labels):
         header = False
         notes.append("the first line holds data, so the columns are named x0, x1, and so on")
-    table = _table(file, records, label, header)
+    table = _table(file, records, labels, header)
     if not header:
         _refuse_header(table)
-    labelled = [row for row, cells in enumerate(table.rows) if cells[table.label].strip()]
-    if len(labelled) < len(table.rows):
-        left_out = len(table.rows) - len(labelled)
-        notes.append(f"{left_out} of {len(table.rows)} rows have no action and are left out")
-    if not labelled:
-        raise InputError(
-            f"{path}: column {table.columns[table.label]!r} holds no action: "
-            "name the column that does."
-        )
+    labelled = _labelled(table, notes)
     cells = tuple(zip(*(table.rows[row] for row in labelled), strict=True))
     shown = _Shown(table, labelled, cells)
     stamps = shown.stamps(notes)
     read = [
         shown.feature(index, notes)
         for index in range(len(table.columns))
-        if index not in (table.label, None if stamps is None else table.columns.index(STAMP))
+        if index not in table.labels and (stamps is None or table.columns[index] != STAMP)
     ]
     if not read:
         raise InputError(
             f"{path} has no column beside the actions: add one per value of the state, "
             "separated by commas."
         )
-    actions, chosen = shown.actions()
+    taken, label = shown.events()
+    actions, chosen = shown.actions(taken, label)
+    channels, channel = in_sorted_order(table.channels, label)
     return Read(
         Demonstration(
             path.name,
             tuple(feature for feature, _ in read),
-            np.column_stack([values for _, values in read]),
-            np.array(labelled, dtype=np.int64) if stamps is None else stamps,
+            np.column_stack([values for _, values in read])[taken],
+            (np.array(labelled, dtype=np.int64) if stamps is None else stamps)[taken],
             actions,
             chosen,
-            (DEFAULT_CHANNEL,),
-            np.zeros(len(labelled), dtype=np.int64),
+            channels,
+            channel,
         ),
         tuple(notes),
     )
@@ -128,9 +125,16 @@ class _Table:
     columns: tuple[str, ...]
     rows: Sequence[Sequence[str]]
     """Each as long as `columns`."""
-    label: int
-    """Position of the column that holds the actions."""
+    labels: tuple[int, ...]
+    """Positions of the columns that hold the actions: one at least, all different."""
     header: bool
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channel of each label column."""
+        if len(self.labels) == 1:
+            return (DEFAULT_CHANNEL,)
+        return tuple(self.columns[label] for label in self.labels)
 
     def line(self, row: int) -> int:
         return self.file.line(row + self.header)
@@ -145,21 +149,34 @@ class _Shown:
     cells: Sequence[Sequence[str]]
     """Column by column."""
 
-    def actions(self) -> tuple[tuple[str, ...], IntArray]:
-        cells = self.cells[self.table.label]
-        labels = tuple(dict.fromkeys(cells))
-        for label in labels:
-            if not label.isprintable():
+    def events(self) -> tuple[IntArray, IntArray]:
+        """Where each action stands, row by row: positions in `rows` and in `table.labels`."""
+        filled = [[bool(cell.strip()) for cell in self.cells[one]] for one in self.table.labels]
+        taken, label = np.nonzero(np.array(filled).T)
+        return taken.astype(np.int64), label.astype(np.int64)
+
+    def actions(self, taken: IntArray, label: IntArray) -> tuple[tuple[str, ...], IntArray]:
+        """The actions that stand there, sorted, and the position of each event's one."""
+        columns = [self.cells[one] for one in self.table.labels]
+        cells = [
+            columns[column][row] for row, column in zip(taken.tolist(), label.tolist(), strict=True)
+        ]
+        actions = tuple(dict.fromkeys(cells))
+        for action in actions:
+            if not action.isprintable():
+                row = self.rows[int(taken[cells.index(action)])]
                 raise InputError(
-                    f"{self.table.file.path}, line {self._line(cells, label)}: the action "
-                    f"{label!r} must consist of printable characters."
+                    f"{self.table.file.path}, line {self.table.line(row)}: the action "
+                    f"{action!r} must consist of printable characters."
                 )
-        return in_sorted_order(labels, _codes(labels, cells))
+        return in_sorted_order(actions, _codes(actions, cells))
 
     def stamps(self, notes: list[str]) -> IntArray | None:
         """The stamp column; None where there is none."""
         columns = self.table.columns
-        if not self.table.header or STAMP not in columns or columns[self.table.label] == STAMP:
+        if not self.table.header or STAMP not in columns:
+            return None
+        if columns.index(STAMP) in self.table.labels:
             return None
         cells = self.cells[columns.index(STAMP)]
         try:
@@ -242,7 +259,7 @@ def _is_number(cell: str) -> bool:
     return bool(cell) and _numbers((cell,)) is not None
 
 
-def _table(file: _File, records: list[list[str]], label: str | None, header: bool) -> _Table:
+def _table(file: _File, records: list[list[str]], labels: Sequence[str], header: bool) -> _Table:
     path = file.path
     columns = (
         tuple(name.strip() for name in records[0])
@@ -256,12 +273,46 @@ def _table(file: _File, records: list[list[str]], label: str | None, header: boo
                 f"{path}, line {file.line(number)}: there are {len(record)} cells where "
                 f"{len(columns)} were expected: quote cells that contain commas."
             )
-    position = _label_position(columns, label, header)
-    if position is None:
-        raise InputError(f"{path}: there is no column {label!r}: {_listing(columns)}.")
+    positions: list[int] = []
+    for label in labels:
+        position = _label_position(columns, label, header)
+        if position is None:
+            raise InputError(f"{path}: there is no column {label!r}: {_listing(columns)}.")
+        if position in positions:
+            raise InputError(
+                f"{path}: column {columns[position]!r} is named twice as a label: "
+                "name every label column once."
+            )
+        positions.append(position)
     if len(records) == header:
         raise InputError(f"{path} has no rows: record actions together with states first.")
-    return _Table(file, columns, records[header:], position, header)
+    return _Table(file, columns, records[header:], tuple(positions) or (len(columns) - 1,), header)
+
+
+def _labelled(table: _Table, notes: list[str]) -> list[int]:
+    """The rows that have an action in some label column; notes which have none in each."""
+    count = len(table.rows)
+    for label in table.labels:
+        name = table.columns[label]
+        empty = sum(not cells[label].strip() for cells in table.rows)
+        if empty == count:
+            raise InputError(
+                f"{table.file.path}: column {name!r} holds no action: name the column that does."
+            )
+        if not empty:
+            continue
+        if len(table.labels) == 1:
+            notes.append(f"{empty} of {count} rows have no action and are left out")
+        else:
+            notes.append(
+                f"{empty} of {count} rows have no action in column {name!r} and are left out of "
+                "its channel"
+            )
+    return [
+        row
+        for row, cells in enumerate(table.rows)
+        if any(cells[label].strip() for label in table.labels)
+    ]
 
 
 def _check_names(path: Path, columns: Sequence[str]) -> None:
@@ -280,31 +331,31 @@ def _listing(columns: Sequence[str]) -> str:
     return f"the columns are {', '.join(columns[:_LISTED])}{more}"
 
 
-def _label_position(columns: Sequence[str], label: str | None, header: bool) -> int | None:
-    if label is None:
-        return len(columns) - 1
+def _label_position(columns: Sequence[str], label: str, header: bool) -> int | None:
     name = label.strip()
     if not header and name.isdecimal():
         name = f"x{int(name)}"
     return columns.index(name) if name in columns else None
 
 
-def _first_is_data(records: Sequence[Sequence[str]], label: str | None) -> bool:
+def _first_is_data(records: Sequence[Sequence[str]], labels: Sequence[str]) -> bool:
     """Whether the first record, which should name the columns, holds a row's numbers."""
     first = [cell.strip() for cell in records[0]]
-    if label is not None and label.strip() in first:
+    if any(label.strip() in first for label in labels):
         return False
     names = [f"x{index}" for index in range(len(first))]
-    position = _label_position(names, label, header=False)
-    position = len(first) - 1 if position is None else position
-    cells = first[:position] + first[position + 1 :]
+    found = (_label_position(names, label, header=False) for label in labels)
+    positions = {position for position in found if position is not None} or {len(first) - 1}
+    others = [index for index in range(len(first)) if index not in positions]
+    cells = [first[index] for index in others]
     if not cells or not all(map(_is_number, cells)):
         return False
     # Tables of unnamed columns are often written with their indices as names.
-    counted = cells == [str(index) for index in range(len(first)) if index != position]
+    counted = cells == [str(index) for index in others]
     recurs = any(
         record[position].strip() == first[position]
         for record in records[1:]
+        for position in positions
         if position < len(record)
     )
     return recurs or not counted
@@ -314,7 +365,7 @@ def _refuse_header(table: _Table) -> None:
     """Refuses column names where data should be: text above columns of numbers."""
     if len(table.rows) < 2:
         return
-    features = [index for index in range(len(table.columns)) if index != table.label]
+    features = [index for index in range(len(table.columns)) if index not in table.labels]
     first = [table.rows[0][index].strip() for index in features]
     if not features or any(not cell or _is_number(cell) for cell in first):
         return

@@ -21,7 +21,7 @@ from rebt_ros.storage.text import unreadable
 class InputOptions:
     """How to read inputs; see `read_csv` and `read_bag` for what each means."""
 
-    label: str | None = None
+    labels: tuple[str, ...] = ()
     """For CSV tables."""
     header: bool = True
     """For CSV tables."""
@@ -114,7 +114,7 @@ def _check_distinct(paths: Sequence[Path]) -> None:
 
 def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
     given = (
-        (options.label is not None, "a label column", InputKind.TABLE),
+        (bool(options.labels), "a label column", InputKind.TABLE),
         (not options.header, "the absence of a header", InputKind.TABLE),
         (bool(options.state_topics), "a state topic", InputKind.BAG),
         (bool(options.action_topics), "an action topic", InputKind.BAG),
@@ -129,7 +129,7 @@ def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
 
 
 def _table(path: Path, options: InputOptions) -> Read:
-    return read_csv(path, label=options.label, header=options.header)
+    return read_csv(path, labels=options.labels, header=options.header)
 
 
 def _recording(path: Path, _: InputOptions) -> Read:
