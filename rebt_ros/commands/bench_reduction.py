@@ -24,7 +24,7 @@ from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
 from rebt_ros.algorithms.rules import leaf_rules
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import run
+from rebt_ros.commands.shell import aligned, run
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.decision_tree.tree import DecisionTree, Leaf
 from rebt_ros.demonstration.table import tabulate
@@ -282,14 +282,7 @@ def _table(figures: Mapping[str, Figures]) -> str:
     for mode, one in figures.items():
         lines.append((f"{mode} mode", *one.reductions.cells(), str(one.mismatches)))
         lines.append((f"{mode} mode, Inverters counted", *one.as_emitted.cells(), ""))
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(
-            cell.rjust(width) if place else cell.ljust(width)
-            for place, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ).rstrip()
-        for line in lines
-    )
+    return "\n".join(aligned(lines))
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import loads
 from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
-from rebt_ros.commands.shell import run, use_color
+from rebt_ros.commands.shell import aligned, run, use_color
 from rebt_ros.errors import RebtError
 from rebt_ros.storage.atomic import write_text_atomically
 
@@ -298,10 +298,7 @@ def _report(
         ("demonstrator, new starts", *_figures(taught)),
         ("learned tree, new starts", *_figures(learned)),
     ]
-    widths = [max(len(row[place]) for row in rows) for place in range(4)]
-    for first, *others in rows:
-        cells = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
-        print(f"{first:<{widths[0]}}  " + "  ".join(cells))
+    print("\n".join(aligned(rows)))
     ratio = _share(learned) / _share(taught) if _share(taught) else 0.0
     print(f"\nThe learned tree reaches the goal {ratio:.0%} as often as the demonstrator.")
     print(f"It took {seconds:.0f} s; recordings, tree, picture and logs are in {plan.out}")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rebt_ros import offline
-from rebt_ros.commands.shell import add_input_options, input_options, run
+from rebt_ros.commands.shell import add_input_options, aligned, input_options, run
 from rebt_ros.replay import Disagreement, Replay
 
 #: Recordings whose rows lie closer have no clock, as CSV tables (seconds).
@@ -65,7 +65,7 @@ def _confusion_table(result: Replay) -> Iterator[str]:
     for label, counts in zip(result.actions, result.confusion.tolist(), strict=True):
         if any(counts):
             cells.append([label, *(str(count or "·") for count in counts[: len(chosen)])])
-    return _aligned(cells)
+    return aligned(cells)
 
 
 def _disagreement_table(listed: Sequence[Disagreement]) -> Iterator[str]:
@@ -75,15 +75,7 @@ def _disagreement_table(listed: Sequence[Disagreement]) -> Iterator[str]:
         seconds = [f"{one.seconds:.3f}"] if has_clock else []
         row = [one.demonstration, str(one.row), *seconds, one.shown, one.chosen or "(none)"]
         cells.append(row)
-    return _aligned(cells)
-
-
-def _aligned(cells: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Lines in which columns line up: the first to the left, the others to the right."""
-    widths = [max(len(row[place]) for row in cells) for place in range(len(cells[0]))]
-    for first, *others in cells:
-        right = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
-        yield "  ".join((f"{first:<{widths[0]}}", *right))
+    return aligned(cells)
 
 
 if __name__ == "__main__":
