@@ -26,7 +26,7 @@ from rebt_ros.edit_distance.canonical import CanonicalTree, Integers
 Numbers: TypeAlias = NDArray[np.float64]
 
 #: Pairs of nodes that the search for swaps may look at.
-_MOST_WORK = 100_000_000
+_MOST_WORK = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
