@@ -57,11 +57,10 @@ def solve(pair: Pair, *, whole: bool) -> Solution:
         integrality=int(whole),
         options={"node_limit": _MOST_BRANCHES, "time_limit": _LONGEST},
     )
-    if whole:
-        found = result.get("mip_dual_bound")
-    else:
-        found = result.fun if result.success else None
-    bound = np.inf if found is None or not np.isfinite(found) else -float(found)
+    # Of the linear program, which has no branches, the best value is the bound.
+    found = result.get("mip_dual_bound") if whole else result.fun
+    usable = found is not None and np.isfinite(found) and (whole or result.success)
+    bound = -float(found) if usable else np.inf
     if result.x is None:
         return Solution(bound, None)
     images = result.x[: pair.same_label.size].reshape(pair.same_label.shape)
