@@ -50,7 +50,11 @@ def _parser() -> argparse.ArgumentParser:
         "config", type=Path, metavar="CONFIG", help="configuration file of an experiment (*.json)"
     )
     parser.add_argument(
-        "--ticks", type=int, default=TICKS, metavar="N", help="ticks of the tree (%(default)s)"
+        "--ticks",
+        type=int,
+        default=TICKS,
+        metavar="N",
+        help="ticks of the tree (default: %(default)s)",
     )
     parser.add_argument(
         "--seed",
@@ -79,9 +83,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--bag",
         type=BagStorage,
+        nargs="?",
+        const=BagStorage.MCAP,
         choices=list(BagStorage),
         metavar="|".join(one.value for one in BagStorage),
-        help=f"also write a rosbag2 bag, DIR/{_BAG}, with every tick's state",
+        help=f"also write a rosbag2 bag, DIR/{_BAG}, with every tick's state "
+        "(default: none; without a value: mcap)",
     )
     return parser
 

@@ -62,7 +62,14 @@ class SyntheticRobotNode(Node):
         repeats = declare.integer(
             "repeats", REPEATS, "How often Repeaters run their children.", 1, _LARGEST
         )()
-        enabled = declare.flag("enabled", True, "Whether to act from the start.")()
+        self._enabled = declare.flag("enabled", True, "Whether to act from the start.")()
+        self._audience = declare.integer(
+            "wait_for_subscribers",
+            0,
+            "Subscribers that state and action must have each before the robot begins to act.",
+            0,
+            1000,
+        )()
         if not path:
             raise OptionError("parameter 'config' is empty: give it a configuration file.")
 
@@ -79,7 +86,7 @@ class SyntheticRobotNode(Node):
         )
         self._ticked = 0
         self._done = 0
-        self._enabled = False
+        self._begun = False
 
         self._layout = Float64MultiArray().layout
         labels = dimension_labels_of(self._robot.variables)
@@ -93,12 +100,10 @@ class SyntheticRobotNode(Node):
         self._outcomes = self.create_publisher(Bool, "outcome", qos)
         self.create_service(SetBool, "~/enable", self._on_enable)
         self.create_timer(1.0 / rate, self._on_tick)
-        if enabled:
-            self._enable()
         self.get_logger().info(f"{config.name}: {self._what_it_does()}")
 
     def _on_tick(self) -> None:
-        if not self._enabled:
+        if not self._enabled or (not self._begun and not self._begin()):
             return
         done = self._robot.step()
         self._ticked += 1
@@ -108,7 +113,7 @@ class SyntheticRobotNode(Node):
             self._actions.publish(String(data=action.label))
             self._outcomes.publish(Bool(data=action.succeeded))
         if self._over:
-            self._disable()
+            self._end()
             self.get_logger().info(self._what_it_does())
 
     @property
@@ -116,38 +121,49 @@ class SyntheticRobotNode(Node):
         return self._ticks > 0 and self._ticked >= self._ticks
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        if request.data and not self._enabled and not self._over:
-            self._enable()
-        elif self._enabled and not request.data:
-            self._disable()
+        if not request.data:
+            self._end()
+        elif not self._over:
+            self._enabled = True
         response.success = self._enabled == request.data
         response.message = self._what_it_does()
         return response
 
-    def _enable(self) -> None:
-        """Begins to act once all who listen already are sure to hear states and actions in order.
+    def _begin(self) -> bool:
+        """Makes sure that all who listen already hear states and actions in their order.
 
         A subscriber that this node knows may not know this node yet: what is sent until then it
         gets late, and that on one topic after what is sent later on another.
+
+        Returns:
+            Whether there are enough subscribers to begin.
         """
-        self._enabled = True
+        topics = (self._states, self._actions)
+        if any(one.get_subscription_count() < self._audience for one in topics):
+            return False
         self._publish_state()
         self._actions.publish(String())
-        for publisher in (self._states, self._actions):
+        for publisher in topics:
             publisher.wait_for_all_acked(Duration(seconds=_GREETING))
+        self._begun = True
+        return True
 
-    def _disable(self) -> None:
-        self._enabled = False
-        self._actions.publish(String())
+    def _end(self) -> None:
+        if self._begun:
+            self._actions.publish(String())
+        self._enabled = self._begun = False
 
     def _publish_state(self) -> None:
         self._states.publish(Float64MultiArray(layout=self._layout, data=self._robot.state))
 
     def _what_it_does(self) -> str:
-        so_far = f"{self._ticked} ticks and {self._done} actions so far."
         if self._over:
             return f"at the end after {self._ticked} ticks and {self._done} actions."
-        return f"{'acting' if self._enabled else 'not acting'}, {so_far}"
+        so_far = f"{self._ticked} ticks and {self._done} actions so far."
+        if not self._enabled:
+            return f"not acting, {so_far}"
+        waiting = f" once it has {self._audience} subscribers" if self._audience else ""
+        return f"acting{'' if self._begun else waiting}, {so_far}"
 
 
 def main(args: list[str] | None = None) -> None:

@@ -40,9 +40,9 @@ STEP_COUNTS: Final = (2, 3, 4, 5)
 PSA_SIZES: Final = (2, 3)
 THRESHOLD: Final = 0.5
 
-#: Probabilities: a step that is not the last acts; acting is a Parallel/Selector node; testing is a
-#: Selector; a condition is inverted.
-_ACTS, _PSA, _SELECTOR, _INVERTED = 0.4, 0.3, 0.3, 0.7
+#: Probabilities, as they are in the published files: a step that is not the last acts; acting is a
+#: Parallel/Selector node; testing is a Selector; a condition is inverted.
+_ACTS, _PSA, _SELECTOR, _INVERTED = 0.4, 0.25, 0.3, 0.75
 
 
 def generate_configs(
@@ -73,7 +73,7 @@ def generate_configs(
             continue
         seen.add(form)
         configs.append(ExperimentConfig(f"expr{len(configs)}", root))
-        if progress is not None and len(configs) % 1000 == 0:
+        if progress is not None and len(configs) % 100 == 0:
             progress(len(configs) / count)
     return configs
 
