@@ -74,6 +74,12 @@ def own_domain() -> Iterator[int]:
     raise RuntimeError("all ROS domains are in use")
 
 
+def command_of(node: str) -> list[str]:
+    """What starts a node of the checkout like its installed executable does."""
+    blocking = ["/usr/bin/env", "--block-signal=INT,TERM"]
+    return [*blocking, sys.executable, "-m", "rebt_ros.ros.entry", node]
+
+
 class NodeProcess:
     """A node of the package in a process of its own.
 
@@ -93,7 +99,7 @@ class NodeProcess:
         parameters: Mapping[str, object] | None = None,
         arguments: Sequence[str] = (),
     ) -> None:
-        command = [sys.executable, "-m", f"rebt_ros.ros.{module}", "--ros-args"]
+        command = [*command_of(module.removesuffix("_node")), "--ros-args"]
         for name, value in (parameters or {}).items():
             command += ["-p", f"{name}:={_yaml(value)}"]
         environment = dict(
