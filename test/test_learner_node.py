@@ -137,17 +137,7 @@ def test_relearn_publishes_writes_and_answers(domain: int, peer: Peer, tmp_path:
         assert "Traceback" not in learner.stderr
 
 
-def test_the_tree_on_disk_is_published_again(domain: int, peer: Peer, tmp_path: Path) -> None:
-    _record(tmp_path / "demonstrations")
-    with NodeProcess("learner_node", domain, tmp_path) as learner:
-        assert peer.call("/learner/relearn").success
-        assert learner.stop(signal.SIGTERM) == 0
-    with NodeProcess("learner_node", domain, tmp_path):
-        trees = peer.listen(String, "behavior_tree", LATCHED)
-        assert _latest(peer, trees, 1) == read_tree(tmp_path / "learned" / "tree.json")
-
-
-def test_the_tree_on_disk_reaches_an_executor_that_starts_later(
+def test_after_a_restart_the_tree_on_disk_is_published_again_also_to_a_later_executor(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
     _record(tmp_path / "demonstrations")
@@ -156,7 +146,8 @@ def test_the_tree_on_disk_reaches_an_executor_that_starts_later(
         learner.stop(signal.SIGKILL)
     learned = read_tree(tmp_path / "learned" / "tree.json")
     with NodeProcess("learner_node", domain, tmp_path) as learner:
-        learner.says("published the tree in")
+        trees = peer.listen(String, "behavior_tree", LATCHED)
+        assert _latest(peer, trees, 1) == learned
         with NodeProcess("executor_node", domain, tmp_path):
             status = peer.wait_until(
                 lambda: (
@@ -371,6 +362,8 @@ def test_an_error_that_nobody_expected_ends_the_call_only(
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with NodeProcess("learner_node", domain, tmp_path, {"output": tmp_path / "loop"}) as learner:
         assert not peer.call("/learner/relearn").success
+        _set(peer, output="~of nobody/learned")
+        assert "there is no such home" in peer.call("/learner/relearn").message
         _set(peer, output=str(tmp_path / "learned"))
         assert peer.call("/learner/relearn").success
         assert learner.stop() == 0

@@ -72,8 +72,9 @@ def _ended_in_order(process: NodeProcess) -> None:
 
 
 def _moments(node: str, number: signal.Signals) -> Iterator[float]:
-    """Half of them while Python and the node start, the others whenever."""
+    """At once, half of them while Python and the node start, the others whenever."""
     chance = random.Random(f"{node} {number} {os.environ.get('REBT_ROS_SEED', '0')}")
+    yield 0.0
     for place in range(MOMENTS):
         yield chance.uniform(0.0, AT_WORK if place % 2 else AT_WORK / 5)
 
