@@ -385,10 +385,22 @@ def test_a_signal_while_learning_ends_node_and_child(
 def test_the_learning_process_does_not_outlive_a_killed_node(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    _record(tmp_path / "demonstrations")
     with NodeProcess("learner_node", domain, tmp_path) as learner:
-        # Stopped, it is as deaf as one that is stuck in a library.
-        child, _ = _stuck(peer)
+        child = _child(peer)
+        assert _is_alive(child)
+        learner.stop(signal.SIGKILL)
+        wait_until(lambda: not _is_alive(child), what="the end of the learning process")
+
+
+def test_a_learning_process_that_is_stuck_in_a_library_ends_with_the_node(
+    domain: int, peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As sum() does not let other threads run, this process cannot hear that its input has ended.
+    (tmp_path / "sklearn.py").write_text("open('stuck', 'w')\nsum(range(10**15))\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        wait_until((tmp_path / "stuck").exists, what="a process that is stuck")
+        child = _child(peer)
         learner.stop(signal.SIGKILL)
         wait_until(lambda: not _is_alive(child), what="the end of the learning process")
 

@@ -93,14 +93,14 @@ def test_a_signal_at_any_moment_ends_a_node_in_order(
 
 
 @pytest.mark.parametrize("node", NODES)
-def test_impatient_signals_end_a_node_in_order(node: str, domain: int, tmp_path: Path) -> None:
+def test_a_hail_of_signals_ends_a_node_in_order(node: str, domain: int, tmp_path: Path) -> None:
     chance = random.Random(f"{node} {os.environ.get('REBT_ROS_SEED', '0')}")
     for _ in range(max(MOMENTS // 2, 1)):
         with _start(node, domain, tmp_path) as process:
             process.hears(signal.SIGTERM)
             process.hears(signal.SIGINT)
             _wait_for_moment(chance.uniform(0.0, AT_WORK), process)
-            for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM):
-                process.process.send_signal(number)
-                _wait_for_moment(chance.uniform(0.0, 0.2), process)
+            while process.process.poll() is None:
+                process.process.send_signal(chance.choice((signal.SIGINT, signal.SIGTERM)))
+                _wait_for_moment(chance.expovariate(1000.0), process)
             _ended_in_order(process)
