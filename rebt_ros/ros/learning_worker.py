@@ -10,16 +10,14 @@ import contextlib
 import ctypes
 import json
 import os
-import queue
 import signal
 import sys
-import threading
 import traceback
 from collections.abc import Callable
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, Final
 
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.ros.learning_process import Lesson, Progress, Request
@@ -47,8 +45,6 @@ def main(node: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _end_with(node)
     _stand_back()
-    requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(sys.stdin.buffer, requests), daemon=True).start()
     # What a library may print must not come between the replies.
     replies = os.fdopen(os.dup(sys.stdout.fileno()), "wb", buffering=0)
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
@@ -60,12 +56,15 @@ def main(node: int) -> None:
             os._exit(0)
 
     _warm_up()
-    while True:
-        say(_reply(requests.get(), lambda progress: say(asdict(progress))))
+    for line in sys.stdin.buffer:
+        say(_reply(line, lambda progress: say(asdict(progress))))
 
 
 def _end_with(node: int) -> None:
-    """Ends this process with the node, also while it is stuck in a library or stopped."""
+    """Ends this process with the node, also while it learns or is stuck in a library.
+
+    Elsewhere than on Linux it learns to the end, and finds then that its input has ended.
+    """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
         if os.getppid() != node:
@@ -76,13 +75,6 @@ def _stand_back() -> None:
     os.nice(_NICENESS)
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(_OUT_OF_MEMORY_SCORE)
-
-
-def _listen(requests: BinaryIO, waiting: queue.SimpleQueue[bytes]) -> None:
-    for line in requests:
-        waiting.put(line)
-    # The node has ended: so does this process, in the middle of learning, too.
-    os._exit(0)
 
 
 def _warm_up() -> None:
