@@ -8,7 +8,7 @@ from setuptools import find_packages, setup
 from setuptools.command.install_scripts import install_scripts
 
 PACKAGE = "rebt_ros"
-NODES = ("demonstrator", "executor", "learner", "recorder", "robot")
+NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
 
 
 class InstallScripts(install_scripts):
@@ -73,8 +73,10 @@ setup(
     entry_points={
         "console_scripts": [
             f"demo = {PACKAGE}.commands.demo:main",
+            f"generate = {PACKAGE}.commands.generate:main",
             f"learn = {PACKAGE}.commands.learn:main",
             f"replay = {PACKAGE}.commands.replay:main",
+            f"simulate = {PACKAGE}.commands.simulate:main",
             *(f"{node} = {PACKAGE}.ros.entry:{node}" for node in NODES),
         ],
     },

@@ -21,7 +21,8 @@ pytest.importorskip("rclpy")
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from ros_processes import NodeProcess, own_domain, wait_until
 
-NODES = ("demonstrator", "executor", "learner", "recorder", "robot")
+from rebt_ros.ros.entry import NODES
+
 MOMENTS = int(os.environ.get("REBT_ROS_SIGNALS", "2"))
 
 #: Until when a node is surely at work, on a machine that has nothing else to do (seconds).

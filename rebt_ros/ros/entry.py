@@ -15,7 +15,7 @@ import sys
 STOP_SIGNALS = frozenset({signal.SIGINT, signal.SIGTERM})
 """What ends a node, in order and with exit code 0."""
 
-NODES = ("demonstrator", "executor", "learner", "recorder", "robot")
+NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
 
 
 def demonstrator() -> None:
@@ -41,6 +41,11 @@ def recorder() -> None:
 def robot() -> None:
     """Runs the simulated robot."""
     _run("robot")
+
+
+def synthetic_robot() -> None:
+    """Runs the synthetic robot."""
+    _run("synthetic_robot")
 
 
 def _run(node: str) -> None:
