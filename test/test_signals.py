@@ -22,6 +22,8 @@ from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from ros_processes import NodeProcess, own_domain, wait_until
 
 from rebt_ros.ros.entry import NODES
+from rebt_ros.simulation.experiment_config import Act
+from rebt_ros.simulation.experiment_file import format_config
 
 MOMENTS = int(os.environ.get("REBT_ROS_SIGNALS", "2"))
 
@@ -45,7 +47,12 @@ def domain() -> Iterator[int]:
 
 def _start(node: str, domain: int, directory: Path) -> NodeProcess:
     executable = _installed(node)
-    return NodeProcess(node, domain, directory, command=executable and [str(executable)])
+    command = executable and [str(executable)]
+    parameters = {}
+    if node == "synthetic_robot":
+        parameters["config"] = directory / "tree.json"
+        parameters["config"].write_text(format_config(Act("go")))
+    return NodeProcess(node, domain, directory, parameters, command=command)
 
 
 def _wait_for_moment(seconds: float, process: NodeProcess) -> None:
