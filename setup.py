@@ -63,6 +63,7 @@ setup(
         "pyeda>=0.29",
         "rosbags>=0.11",
         "scikit-learn>=1.4",
+        "scipy>=1.11",
     ],
     extras_require={
         "pictures": ["matplotlib>=3.6"],
