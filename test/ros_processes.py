@@ -31,7 +31,7 @@ from std_srvs.srv import SetBool, Trigger
 CHECKOUT = Path(__file__).resolve().parents[1]
 
 #: How long a test waits for something that should happen at once, on a busy machine (seconds).
-PATIENCE = 30.0
+PATIENCE = 60.0
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
