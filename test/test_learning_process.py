@@ -70,6 +70,19 @@ def test_learning_tells_how_far_it_is(process: LearningProcess, request_: Reques
     assert len({one.share for one in told if one.stage == "choosing"}) > 5
 
 
+def test_a_reply_that_nobody_waits_for_is_not_taken_for_the_next_one(
+    process: LearningProcess, request_: Request
+) -> None:
+    def fail(progress: Progress) -> None:
+        raise RuntimeError(progress.stage)
+
+    with pytest.raises(RuntimeError, match="reading"):
+        process.ask(request_, cancelled=threading.Event(), progress=fail)
+    nowhere = Request(f"{request_.demonstrations}/nowhere", {})
+    with pytest.raises(LearningError, match="does not exist"):
+        process.ask(nowhere, cancelled=threading.Event())
+
+
 @pytest.mark.parametrize(
     ("number", "sentence"),
     [

@@ -131,6 +131,12 @@ class LearningProcess:
         try:
             with self._limited(limit):
                 reply = _converse(process, request, progress)
+        except Exception:
+            # What it still says must not be taken for the next reply.
+            with self._lock:
+                _kill(process)
+            process.wait()
+            raise
         finally:
             with self._lock:
                 self._asked = False
