@@ -316,7 +316,7 @@ class LearnerNode(Node):
         self._publisher.publish(String(data=document))
 
     def _report(self) -> Report:
-        values: dict[str, Any] = {"learning process": self._process.id}
+        values: dict[str, Any] = {"learning process": self._process.id or "none"}
         if self._learned is not None:
             provenance = self._learned.provenance
             values |= {
