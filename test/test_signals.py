@@ -22,7 +22,7 @@ from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from ros_processes import NodeProcess, own_domain, wait_until
 
 from rebt_ros.ros.entry import NODES
-from rebt_ros.simulation.experiment_config import Act
+from rebt_ros.simulation.experiment_config import Act, Check, Group, GroupKind
 from rebt_ros.simulation.experiment_file import format_config
 
 MOMENTS = int(os.environ.get("REBT_ROS_SIGNALS", "2"))
@@ -51,7 +51,8 @@ def _start(node: str, domain: int, directory: Path) -> NodeProcess:
     parameters = {}
     if node == "synthetic_robot":
         parameters["config"] = directory / "tree.json"
-        parameters["config"].write_text(format_config(Act("go")))
+        tree = Group(GroupKind.SEQUENCE, (Check("/x", 0.5), Act("go")))
+        parameters["config"].write_text(format_config(tree))
     return NodeProcess(node, domain, directory, parameters, command=command)
 
 
