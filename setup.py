@@ -34,6 +34,7 @@ setup(
         "scikit-learn>=1.4",
     ],
     extras_require={
+        "cluster": ["distributed>=2023.5"],
         "pictures": ["matplotlib>=3.6"],
         "test": ["hypothesis", "jsonschema>=4.10", "pytest"],
         "upsampling": ["imbalanced-learn>=0.12"],
@@ -43,6 +44,7 @@ setup(
             f"demo = {PACKAGE}.commands.demo:main",
             f"demonstrator = {PACKAGE}.ros.demonstrator_node:main",
             f"executor = {PACKAGE}.ros.executor_node:main",
+            f"experiment = {PACKAGE}.commands.experiment:main",
             f"learn = {PACKAGE}.commands.learn:main",
             f"learner = {PACKAGE}.ros.learner_node:main",
             f"recorder = {PACKAGE}.ros.recorder_node:main",

@@ -1,0 +1,8 @@
+"""The report as a page."""
+
+from rebt_ros.experiment.report import Report
+
+
+def report_page(report: Report) -> str:
+    """The page."""
+    return ""

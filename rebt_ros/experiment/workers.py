@@ -1,0 +1,99 @@
+"""Runs configurations side by side: on the processors of this machine, or on a Dask cluster.
+
+joblib does it in both cases.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
+
+import joblib
+
+from rebt_ros.errors import OptionError, RebtError
+from rebt_ros.experiment.configurations import Lost
+from rebt_ros.experiment.results import ConfigurationResult
+from rebt_ros.experiment.running import attempt
+from rebt_ros.experiment.settings import Settings
+from rebt_ros.simulation.experiment_config import ExperimentConfig
+
+#: Until a scheduler must have answered (seconds).
+_PATIENCE = 10.0
+#: Results as soon as they are there.  joblib 1.3 keeps them in order, so that those behind a slow
+#: configuration wait for it.
+_AS_FINISHED = "generator" if joblib.__version__.startswith("1.3.") else "generator_unordered"
+
+
+class WorkerError(RebtError):
+    """A worker, or the cluster, does not work."""
+
+
+def run_all(
+    configs: Sequence[ExperimentConfig],
+    settings: Settings,
+    jobs: int = -1,
+    scheduler: str | None = None,
+) -> Iterator[ConfigurationResult | Lost]:
+    """Runs configurations.
+
+    Args:
+        configs: What to run.
+        settings: How.
+        jobs: Processes; -1 for one per processor.  Not for a cluster, of which all workers work.
+        scheduler: Address of a Dask scheduler; None for this machine.
+
+    Yields:
+        What came out, as soon as it is known and so in any order.
+
+    Raises:
+        OptionError: A number of jobs that makes no sense.
+        WorkerError: A worker died, or the cluster cannot be used.
+    """
+    if jobs == 0:
+        raise OptionError("jobs is 0: name a number of processes, or -1 for one per processor.")
+    if not configs:
+        return
+    tasks = (joblib.delayed(attempt)(config, settings) for config in configs)
+    with _cluster(scheduler) if scheduler is not None else contextlib.nullcontext():
+        # One at a time, so that each is written as soon as it is finished.
+        parallel = joblib.Parallel(
+            n_jobs=-1 if scheduler is not None else min(jobs, len(configs)),
+            batch_size=1,
+            return_as=_AS_FINISHED,
+        )
+        try:
+            yield from parallel(tasks)
+        except BrokenProcessPool as err:
+            raise WorkerError(
+                "a worker process died, perhaps of a lack of memory: start the same command again "
+                "with fewer --jobs, and it goes on where it was."
+            ) from err
+
+
+@contextlib.contextmanager
+def _cluster(address: str) -> Iterator[None]:
+    """Lets joblib use a Dask cluster.
+
+    Raises:
+        WorkerError: There is no such cluster, it has no workers, or Dask is not installed.
+    """
+    try:
+        from distributed import Client
+    except ImportError as err:
+        raise WorkerError(
+            "a Dask cluster is used through the package distributed, which is not installed: "
+            "python3 -m pip install distributed."
+        ) from err
+    try:
+        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as err:
+        raise WorkerError(
+            f"no Dask scheduler answers at {address} ({err}): name an address such as "
+            "tcp://127.0.0.1:8786."
+        ) from err
+    with client:
+        if not client.scheduler_info()["workers"]:
+            raise WorkerError(f"the Dask scheduler at {address} has no workers: start some.")
+        with joblib.parallel_config(backend="dask", client=client):
+            yield
