@@ -32,6 +32,7 @@ setup(
         "pyeda>=0.29",
         "rosbags>=0.11",
         "scikit-learn>=1.4",
+        "scipy>=1.11",
     ],
     extras_require={
         "cluster": ["distributed>=2023.5"],

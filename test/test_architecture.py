@@ -36,6 +36,7 @@ LAYERS: Final = (
     {"evaluation", "pictures", "simulation", "storage"},
     {"algorithms"},
     {"decision_tree"},
+    {"edit_distance"},
     {"behavior_tree"},
     {"demonstration"},
     {"logic"},
@@ -69,7 +70,7 @@ HOMES: Final = {
     "jsonschema": (),
     "joblib": ("rebt_ros.commands.bench_*", "rebt_ros.experiment.workers"),
     "matplotlib": ("rebt_ros.pictures.*",),
-    "networkx": ("rebt_ros.algorithms.lat_*",),
+    "networkx": ("rebt_ros.algorithms.lat_*", "rebt_ros.edit_distance.networkx_worker"),
     "py_trees": (
         "rebt_ros.behavior_tree.runtime",
         "rebt_ros.ros",
@@ -78,7 +79,7 @@ HOMES: Final = {
     ),
     "pyeda": ("rebt_ros.logic.minimize",),
     "rosbags": ("rebt_ros.storage", "rebt_ros.storage.*"),
-    "scipy": (),
+    "scipy": ("rebt_ros.edit_distance.program", "rebt_ros.edit_distance.relaxation"),
     "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
 }
 
