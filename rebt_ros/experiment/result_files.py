@@ -1,6 +1,6 @@
 """A directory of results, to which a run that was stopped comes back.
 
-``run.json`` says which settings and versions the results are of, ``configurations/NAME.json`` is
+``run.json`` says which settings and versions the results are of, ``results/NAME.json`` is
 the result of one configuration.
 """
 
@@ -21,6 +21,9 @@ from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.text import read_text
 
 
+_RESULTS = "results"
+
+
 class ResultFiles:
     """Reads and writes the results of one experiment.
 
@@ -34,7 +37,7 @@ class ResultFiles:
     """
 
     def __init__(self, directory: Path, settings: Settings) -> None:
-        self._results = directory / "configurations"
+        self._results = directory / _RESULTS
         self._fingerprint = fingerprint(settings)
         run = directory / "run.json"
         mine = provenance(settings)

@@ -6,7 +6,13 @@ joblib does it in both cases.
 from __future__ import annotations
 
 import contextlib
+import functools
+import os
+import re
+import threading
+import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
 
 import joblib
@@ -20,6 +26,10 @@ from rebt_ros.simulation.experiment_config import ExperimentConfig
 
 #: Until a scheduler must have answered (seconds).
 _PATIENCE = 10.0
+_ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:[0-9]{1,5}")
+_SUCH_AS = "name one such as tcp://127.0.0.1:8786"
+#: How often a worker looks whether its parent is there.
+_WATCH_SECONDS = 0.5
 #: Results as soon as they are there.  joblib 1.3 keeps them in order, so that those behind a slow
 #: configuration wait for it.
 _AS_FINISHED = "generator" if joblib.__version__.startswith("1.3.") else "generator_unordered"
@@ -47,14 +57,17 @@ def run_all(
         What came out, as soon as it is known and so in any order.
 
     Raises:
-        OptionError: A number of jobs that makes no sense.
+        OptionError: A number of jobs or an address that makes no sense.
         WorkerError: A worker died, or the cluster cannot be used.
     """
     if jobs == 0:
         raise OptionError("jobs is 0: name a number of processes, or -1 for one per processor.")
+    if scheduler is not None and not _ADDRESS.fullmatch(scheduler):
+        raise OptionError(f"the scheduler {scheduler!r} is no address: {_SUCH_AS}.")
     if not configs:
         return
-    tasks = (joblib.delayed(attempt)(config, settings) for config in configs)
+    here = os.getpid() if scheduler is None else None
+    tasks = (joblib.delayed(_attempt)(config, settings, here) for config in configs)
     with _cluster(scheduler) if scheduler is not None else contextlib.nullcontext():
         # One at a time, so that each is written as soon as it is finished.
         parallel = joblib.Parallel(
@@ -71,6 +84,31 @@ def run_all(
             ) from err
 
 
+def _attempt(
+    config: ExperimentConfig, settings: Settings, parent: int | None
+) -> ConfigurationResult | Lost:
+    """Runs a configuration, in the process `parent` or in one that is to end with it, if any."""
+    if parent not in (None, os.getpid()):
+        _end_with(parent)
+    return attempt(config, settings)
+
+
+@functools.cache
+def _end_with(parent: int | None) -> None:
+    """Ends this process when its parent ends.
+
+    joblib's processes would finish what was handed to them first when their parent is killed, and
+    be in the way of the run that goes on where it was.
+    """
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH_SECONDS)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 @contextlib.contextmanager
 def _cluster(address: str) -> Iterator[None]:
     """Lets joblib use a Dask cluster.
@@ -79,7 +117,7 @@ def _cluster(address: str) -> Iterator[None]:
         WorkerError: There is no such cluster, it has no workers, or Dask is not installed.
     """
     try:
-        from distributed import Client
+        from distributed import Client, KilledWorker
     except ImportError as err:
         raise WorkerError(
             "a Dask cluster is used through the package distributed, which is not installed: "
@@ -89,11 +127,17 @@ def _cluster(address: str) -> Iterator[None]:
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as err:
         raise WorkerError(
-            f"no Dask scheduler answers at {address} ({err}): name an address such as "
-            "tcp://127.0.0.1:8786."
+            f"no Dask scheduler answers at {address} ({err}): {_SUCH_AS}."
         ) from err
     with client:
         if not client.scheduler_info()["workers"]:
             raise WorkerError(f"the Dask scheduler at {address} has no workers: start some.")
-        with joblib.parallel_config(backend="dask", client=client):
-            yield
+        try:
+            with joblib.parallel_config(backend="dask", client=client):
+                yield
+        except (CancelledError, ImportError, KilledWorker, OSError) as err:
+            raise WorkerError(
+                f"the cluster at {address} failed ({type(err).__name__}: {err}): see that its "
+                "workers can import rebt_ros, and start the same command again; it goes on where "
+                "it was."
+            ) from err
