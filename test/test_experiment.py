@@ -24,6 +24,7 @@ from rebt_ros.experiment.experiment import run_experiment
 from rebt_ros.experiment.settings import Settings
 from rebt_ros.simulation.experiment_config import ExperimentConfig
 
+MODULE = "rebt_ros.commands.experiment"
 SETTINGS = Settings(ticks=200)
 
 
@@ -67,8 +68,7 @@ def copies(configurations: Path, count: int) -> None:
 def started(*arguments: str | Path) -> Iterator[subprocess.Popen[str]]:
     """The command, with a group of processes for itself; killed in the end."""
     running = subprocess.Popen(
-        [sys.executable, "-m", "rebt_ros.commands.experiment", *map(str, arguments)]
-        + ["--ticks", str(SETTINGS.ticks)],
+        [sys.executable, "-m", MODULE, *map(str, arguments), "--ticks", str(SETTINGS.ticks)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

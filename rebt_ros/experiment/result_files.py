@@ -20,7 +20,7 @@ from rebt_ros.simulation.experiment_config import ExperimentConfig
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.text import read_text
 
-
+#: Another name than people give to directories of configurations.
 _RESULTS = "results"
 
 

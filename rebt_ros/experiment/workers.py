@@ -126,9 +126,7 @@ def _cluster(address: str) -> Iterator[None]:
     try:
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as err:
-        raise WorkerError(
-            f"no Dask scheduler answers at {address} ({err}): {_SUCH_AS}."
-        ) from err
+        raise WorkerError(f"no Dask scheduler answers at {address} ({err}): {_SUCH_AS}.") from err
     with client:
         if not client.scheduler_info()["workers"]:
             raise WorkerError(f"the Dask scheduler at {address} has no workers: start some.")
