@@ -20,13 +20,16 @@ import numpy as np
 from rebt_ros.edit_distance.canonical import CanonicalTree, Integers, canonical, canonical_order
 from rebt_ros.edit_distance.labelled_tree import LabelledTree
 from rebt_ros.edit_distance.pair import Pair, Swaps
-from rebt_ros.edit_distance.program import solve
+from rebt_ros.edit_distance.program import TOLERANCE, solve
 from rebt_ros.edit_distance.relaxation import ROUNDING, Relaxation
 
 #: Assignment problems per pair.
-_MOST_STEPS = 40
-#: Pairs of nodes up to which bounds that have not met by then go to the integer program.
-_LARGEST_PROGRAM = 2_000
+_MOST_STEPS = 30
+#: Mappings per pair that are improved by swaps though they score no more than others.
+_MOST_STARTS = 4
+#: Pairs of nodes up to which bounds that have not met by then go to the linear program, which takes
+#: some milliseconds, and after it to the integer one: the largest take less than 1 s or so.
+_LARGEST_LINEAR, _LARGEST_INTEGER = 2_500, 500
 #: Pairs of nodes beyond which labels only are looked at: no behavior tree to be read is so large.
 _LARGEST_RELAXATION = 250_000
 
@@ -101,10 +104,13 @@ def _ordered(one: CanonicalTree, other: CanonicalTree) -> tuple[CanonicalTree, C
 
 
 def _least_distance(one: CanonicalTree, other: CanonicalTree) -> int:
-    """What sizes and labels alone say."""
+    """What the labels and the numbers of children alone say."""
     small, large = _ordered(one, other)
     same = (Counter(small.labels) & Counter(large.labels)).total()
-    return 2 * (len(large) - len(small)) + len(small) - same
+    # A node keeps as many edges to children as its image has at most; no pairing of the numbers
+    # has more in common than that of both in descending order.
+    edges = sum(map(min, small.families, large.families))
+    return len(small) + 2 * len(large) - 2 - same - 2 * edges
 
 
 @lru_cache(maxsize=1 << 16)
@@ -165,26 +171,32 @@ class _Search:
             if not relaxation.step(self._score):
                 break
             relaxation.assign()
-        if self._pair.same_label.size <= _LARGEST_PROGRAM:
-            solution = solve(self._pair)
-            self._limit(solution.bound)
+        for whole, largest in ((False, _LARGEST_LINEAR), (True, _LARGEST_INTEGER)):
+            if self._pair.same_label.size > largest:
+                return
+            solution = solve(self._pair, whole=whole)
+            self._limit(solution.bound, TOLERANCE)
             if solution.mapping is not None:
                 self._try(solution.mapping)
+            if self._done:
+                return
 
     @property
     def _done(self) -> bool:
         return bool(self._score >= self._most)
 
-    def _limit(self, bound: float) -> None:
+    def _limit(self, bound: float, tolerance: float = ROUNDING) -> None:
         """Scores are whole numbers."""
         if math.isfinite(bound):
-            self._most = min(self._most, math.floor(bound + ROUNDING))
+            self._most = min(self._most, math.floor(bound + tolerance))
 
     def _try(self, mapping: Integers) -> None:
         key = mapping.tobytes()
         if key in self._seen:
             return
         self._seen.add(key)
+        if len(self._seen) > _MOST_STARTS and self._pair.score(mapping) <= self._score:
+            return
         improved = self._swaps.improved(mapping)
         score = self._pair.score(improved)
         if score > self._score:

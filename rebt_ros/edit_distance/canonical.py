@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -32,6 +33,8 @@ class CanonicalTree:
     """The nodes with children."""
     first_children: Integers = field(compare=False, repr=False)
     """The first child of each of them, less 1: its position among the nodes below the root."""
+    families: tuple[int, ...] = field(compare=False, repr=False)
+    """How many children each of them has, in descending order."""
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -50,6 +53,7 @@ def canonical(tree: LabelledTree) -> CanonicalTree:
         np.array([-1, *parents], dtype=np.intp),
         np.array(inner, dtype=np.intp),
         np.searchsorted(parents, inner),
+        tuple(sorted(Counter(parents).values(), reverse=True)),
     )
 
 

@@ -26,7 +26,7 @@ from rebt_ros.edit_distance.canonical import CanonicalTree, Integers
 Numbers: TypeAlias = NDArray[np.float64]
 
 #: Pairs of nodes that the search for swaps may look at.
-_MOST_WORK = 100_000_000
+_MOST_WORK = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,8 @@ class Pair:
     shape (small, large)."""
 
     @classmethod
-    def of(cls, one: CanonicalTree, other: CanonicalTree) -> Pair:
-        """The pair of two trees, whatever their order."""
-        small, large = sorted((one, other), key=lambda tree: (len(tree), tree.code))
+    def of(cls, small: CanonicalTree, large: CanonicalTree) -> Pair:
+        """The pair of a tree and one that is not smaller."""
         numbers = {label: number for number, label in enumerate(dict.fromkeys(small.labels))}
         rows = np.array([numbers[label] for label in small.labels])
         columns = np.array([numbers.get(label, -1) for label in large.labels])

@@ -16,14 +16,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, milp
+from scipy.optimize import Bounds, LinearConstraint, linear_sum_assignment, milp
 from scipy.sparse import csr_array
 
 from rebt_ros.edit_distance.canonical import CanonicalTree, Integers
 from rebt_ros.edit_distance.pair import Pair
 
+#: What the solver takes for nothing adds up to less.
+TOLERANCE = 1e-4
 #: Most are solved at the root.
-_MOST_BRANCHES = 100
+_MOST_BRANCHES = 20
 #: Far more than they take, in s; on a stalled machine only do results depend on it.
 _LONGEST = 20.0
 
@@ -33,38 +35,36 @@ class Solution:
     """What the solver found."""
 
     bound: float
-    """No mapping scores more; infinite where the solver found no bound."""
+    """No mapping scores more, but for rounding; infinite where the solver found no bound."""
     mapping: Integers | None
     """A good mapping, if it found one."""
 
 
-def solve(pair: Pair) -> Solution:
-    """Solves the integer program of two trees of at least two nodes."""
+def solve(pair: Pair, *, whole: bool) -> Solution:
+    """Solves the program of two trees of at least two nodes.
+
+    Args:
+        pair: The trees.
+        whole: Whether nodes and edges have whole images, or may be split between several, which is
+            solved several times as fast.
+    """
     constraints, most = _constraints(pair)
     edges = constraints.shape[1] - pair.same_label.size
     result = milp(
         -np.concatenate([pair.same_label.ravel(), np.full(edges, 2.0)]),
         constraints=LinearConstraint(constraints, -np.inf, most),
         bounds=Bounds(0, 1),
-        integrality=1,
+        integrality=int(whole),
         options={"node_limit": _MOST_BRANCHES, "time_limit": _LONGEST},
     )
-    bound = result.get("mip_dual_bound")
-    return Solution(
-        np.inf if bound is None or not np.isfinite(bound) else -float(bound),
-        None if result.x is None else _mapping(result.x[: pair.same_label.size], pair),
-    )
-
-
-def _mapping(images: np.ndarray, pair: Pair) -> Integers:
-    """The mapping of a solution; nodes without image get free ones."""
-    nodes, chosen = np.nonzero(np.round(images).reshape(pair.same_label.shape))
-    mapping = np.full(len(pair.small), -1, dtype=np.intp)
-    mapping[nodes] = chosen
-    free = np.setdiff1d(np.arange(len(pair.large)), chosen)
-    missing = np.flatnonzero(mapping < 0)
-    mapping[missing] = free[: len(missing)]
-    return mapping
+    # Of the linear program, which has no branches, the best value is the bound.
+    found = result.get("mip_dual_bound") if whole else result.fun
+    usable = found is not None and np.isfinite(found) and (whole or result.success)
+    bound = -float(found) if usable else np.inf
+    if result.x is None:
+        return Solution(bound, None)
+    images = result.x[: pair.same_label.size].reshape(pair.same_label.shape)
+    return Solution(bound, linear_sum_assignment(images, maximize=True)[1])
 
 
 def _constraints(pair: Pair) -> tuple[csr_array, np.ndarray]:
