@@ -35,7 +35,7 @@ setup(
         "scipy>=1.11",
     ],
     extras_require={
-        "cluster": ["distributed>=2023.5"],
+        "cluster": ["distributed>=2023.5", "joblib>=1.4"],
         "pictures": ["matplotlib>=3.6"],
         "test": ["hypothesis", "jsonschema>=4.10", "pytest"],
         "upsampling": ["imbalanced-learn>=0.12"],

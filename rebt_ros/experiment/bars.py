@@ -16,7 +16,7 @@ _WIDTH, _HEIGHT = 760.0, 300.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 12.0, 46.0, 50.0
 #: Of a group of bars, this share is left free between groups.
 _GAP = 0.25
-_MOST_TICKS, _MOST_LABELS = 6, 20
+_MOST_TICKS, _MOST_LABELS = 6, 14
 
 
 @dataclass(frozen=True, slots=True)

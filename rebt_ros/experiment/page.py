@@ -87,7 +87,7 @@ def _plots(report: Report) -> Iterator[str]:
         histogram(
             [(f"{mode.value} mode", [one for one in values if one]) for mode, values in saved],
             lambda value: math.floor(value / _REDUCTION_STEP),
-            lambda group: f"{group * _REDUCTION_STEP} to {(group + 1) * _REDUCTION_STEP}",
+            lambda group: f"{group * _REDUCTION_STEP}..{(group + 1) * _REDUCTION_STEP}",
             title="Relative reduction of nodes, without SAES",
             x_label="per cent of the nodes of BT-Espresso's tree that are gone",
             y_label="trees",

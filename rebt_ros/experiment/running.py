@@ -30,7 +30,7 @@ from rebt_ros.experiment.scores import ComparedTree, Distances, comparable, scor
 from rebt_ros.experiment.settings import MAX_DEPTH, Settings
 from rebt_ros.experiment.words import one_line
 from rebt_ros.simulation.experiment_config import ExperimentConfig, as_behavior_tree
-from rebt_ros.simulation.experiment_robot import ExperimentRobot, simulate
+from rebt_ros.simulation.experiment_robot import ExperimentRobot, published_variables, simulate
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def run_configuration(config: ExperimentConfig, settings: Settings) -> Configura
         InputError: No action was done.
     """
     start = time.monotonic()
-    robot = ExperimentRobot(config, settings.seed)
+    robot = ExperimentRobot(config, settings.seed, variables=published_variables(config))
     demonstration = simulate(robot, settings.ticks).demonstration
     if not len(demonstration):
         raise InputError(f"{config.name} did nothing in {settings.ticks} ticks: simulate more.")

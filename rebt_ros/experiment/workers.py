@@ -30,9 +30,8 @@ _ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:[0-9]{1,5}")
 _SUCH_AS = "name one such as tcp://127.0.0.1:8786"
 #: How often a worker looks whether its parent is there.
 _WATCH_SECONDS = 0.5
-#: Results as soon as they are there.  joblib 1.3 keeps them in order, so that those behind a slow
-#: configuration wait for it.
-_AS_FINISHED = "generator" if joblib.__version__.startswith("1.3.") else "generator_unordered"
+#: joblib 1.3 returns results in order only, so that those behind a slow configuration wait for it.
+_IN_ORDER = joblib.__version__.startswith("1.3.")
 
 
 class WorkerError(RebtError):
@@ -73,7 +72,7 @@ def run_all(
         parallel = joblib.Parallel(
             n_jobs=-1 if scheduler is not None else min(jobs, len(configs)),
             batch_size=1,
-            return_as=_AS_FINISHED,
+            return_as="generator" if _IN_ORDER else "generator_unordered",
         )
         try:
             yield from parallel(tasks)
@@ -123,6 +122,11 @@ def _cluster(address: str) -> Iterator[None]:
             "a Dask cluster is used through the package distributed, which is not installed: "
             "python3 -m pip install distributed."
         ) from err
+    if _IN_ORDER:
+        raise WorkerError(
+            f"joblib {joblib.__version__} cannot return results from Dask one by one: install "
+            "joblib 1.4 or newer."
+        )
     try:
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as err:
