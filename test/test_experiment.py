@@ -208,6 +208,19 @@ def test_a_configuration_that_fails_is_lost_and_does_not_stop_the_others(
     assert "expr9 is lost: ZeroDivisionError: division by zero" in capsys.readouterr().out
 
 
+def test_a_configuration_of_one_action_is_not_compared_and_not_lost(
+    configurations: Path, tmp_path: Path
+) -> None:
+    single = group("sequence", group("sequence", condition("x"), action("reach")))
+    (configurations / "expr1.json").write_text(json.dumps(single))
+    run_experiment(configurations, tmp_path / "out", SETTINGS, jobs=1)
+    found = report(tmp_path / "out")
+    assert found["lost_configurations"] == []
+    assert found["not_comparable"] == 1
+    assert found["configurations"] == 4
+    assert found["modes"]["default"]["subtrees"] == 6
+
+
 def test_a_worker_of_other_versions_is_refused(
     configurations: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -221,7 +234,7 @@ def test_a_worker_of_other_versions_is_refused(
 def test_a_killed_run_leaves_no_process_and_is_resumed_to_the_same_report(
     configurations: Path, tmp_path: Path
 ) -> None:
-    copies(configurations, 8)
+    copies(configurations, 6)
     out, straight = tmp_path / "out", tmp_path / "straight"
     with started(configurations, "--out", out, "--jobs", "2") as running:
         wait_for(lambda: any((out / "results").glob("*.json")), running)
@@ -229,7 +242,7 @@ def test_a_killed_run_leaves_no_process_and_is_resumed_to_the_same_report(
     wait_for(lambda: not group_exists(running.pid))
     assert not (out / "report.json").exists()
     kept = {path: path.read_bytes() for path in (out / "results").glob("*.json")}
-    assert 1 <= len(kept) < 8
+    assert 1 <= len(kept) < 6
     run_experiment(configurations, out, SETTINGS, jobs=1)
     assert {path: path.read_bytes() for path in kept} == kept
     run_experiment(configurations, straight, SETTINGS, jobs=1)
@@ -261,18 +274,19 @@ def test_a_dask_cluster_of_two_processes_gives_the_same_results(
     distributed = pytest.importorskip("distributed")
     alone, together = tmp_path / "alone", tmp_path / "together"
     settings = Settings(ticks=SETTINGS.ticks, networkx_pairs=1, pair_seconds=60)
-    run_experiment(configurations, alone, settings, jobs=1)
+    two = experiment.Chosen(limit=2)
+    run_experiment(configurations, alone, settings, two, jobs=1)
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
         found = run_experiment(
-            configurations, together, settings, scheduler=cluster.scheduler_address
+            configurations, together, settings, two, scheduler=cluster.scheduler_address
         )
-    assert len(found.results) == 3
+    assert len(found.results) == 2
     assert report(together) == report(alone)
     assert (together / "report.csv").read_bytes() == (alone / "report.csv").read_bytes()
-    assert report(alone)["measure"]["networkx_tried"] == 3
-    assert report(alone)["measure"]["at_most_networkx"] == [3, 3]
+    assert report(alone)["measure"]["networkx_tried"] == 2
+    assert report(alone)["measure"]["at_most_networkx"] == [2, 2]
 
 
 @pytest.mark.parametrize(

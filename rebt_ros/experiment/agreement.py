@@ -35,8 +35,12 @@ class Agreement:
 
 
 def held_out_agreements(table: DemonstrationTable) -> dict[Mode, Agreement]:
-    """The agreement of each mode on the last quarter of the rows; empty for less than 8 rows."""
-    if len(table) < 8:
+    """The agreement of each mode on the last quarter of the rows.
+
+    Returns:
+        Nothing for fewer than two actions or eight rows.
+    """
+    if len(table.actions) < 2 or len(table) < 8:
         return {}
     part = np.arange(len(table)) * 4 // len(table)
     shown, choosing, judging = (table.where(rows) for rows in (part < 2, part == 2, part == 3))

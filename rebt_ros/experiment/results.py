@@ -27,7 +27,8 @@ class SubtreeResult:
     repeaters: int
     psa: int
     scores: dict[Mode, Score]
-    """Empty where it cannot be compared: none of its actions was ever done."""
+    """Empty where it cannot be compared: none of its actions was ever done, or a single action is
+    all that the configuration did."""
 
     @property
     def usable(self) -> bool:

@@ -97,9 +97,11 @@ def run_configuration(config: ExperimentConfig, settings: Settings) -> Configura
 
 
 def _levels(table: DemonstrationTable) -> dict[Mode, list[_Level]]:
-    """All pruning levels of all modes."""
-    fitted = fit(table, last_action=True, max_depth=MAX_DEPTH)
+    """All pruning levels of all modes; none where one action is all that was done."""
     made: dict[Mode, list[_Level]] = {mode: [] for mode in Mode}
+    if len(table.actions) < 2:
+        return made
+    fitted = fit(table, last_action=True, max_depth=MAX_DEPTH)
     for ccp_alpha in fitted.path.alphas.tolist():
         trained = fitted.at(ccp_alpha)
         baseline = Size.of(main_tree(Mode.BASELINE, trained))
@@ -134,7 +136,7 @@ def _subtree(
 ) -> SubtreeResult:
     tree = labelled(simulated)
     done = any(action.label in table.actions for action in nodes.actions(simulated))
-    if tree is None or not done:
+    if tree is None or not done or not levels[Mode.BASELINE]:
         return SubtreeResult(number, one_line(simulated), len(tree or ()), 0, 0, {})
     compared = ComparedTree(tree, simulated)
     return SubtreeResult(
