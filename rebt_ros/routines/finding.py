@@ -61,13 +61,13 @@ def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:
     if together < max(_FEWEST_TOGETHER, _LEAST_TOGETHER * len(table)) or len(shown.actions) < 2:
         return ()
     read = corpus(shown)
-    offered: dict[tuple[nodes.Node, ...], FoundRoutine] = {}
+    offered: dict[nodes.Node, FoundRoutine] = {}
     for _, program in programs(shown, read)[:_MOST_PROGRAMS]:
         model = Model(program, read)
         model.fit(_THOROUGH)
         found = _Reading(model, shown, table.features).routines(table.channel)
         for routine in sorted(found, key=lambda one: -one.rows):
-            offered.setdefault((type(routine.subtree), routine.subtree.children), routine)
+            offered.setdefault(routine.subtree, routine)
     return tuple(offered.values())
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -142,13 +142,13 @@ class Model:
         offsets = np.cumsum([0, *(len(part.states) for part in parts)])
         size = int(offsets[-1])
         self.states = tuple(
-            state._replace(stream=stream) for stream, part in enumerate(parts) for state in part.states
+            state._replace(stream=stream)
+            for stream, part in enumerate(parts)
+            for state in part.states
         )
         #: The steps of each stream in the order in which they are done.
         self.order = tuple(places(stream) for stream in program)
-        self._of_stream = [
-            slice(int(begin), int(end)) for begin, end in zip(offsets, offsets[1:], strict=False)
-        ]
+        self._of_stream = [slice(int(begin), int(end)) for begin, end in pairwise(offsets)]
         self._is_action = np.zeros((corpus.actions, size))
         self._within = np.zeros((size + 1, size))
         self._stops = np.ones(size + 1)
