@@ -38,12 +38,14 @@ def main() -> None:
             message.data[0] = float(sent[0])
             states.publish(message)
             if sent[0] % every == 0:
-                if sent[1] == 0:
-                    # A subscriber may hear of the two publishers one after the other.
-                    states.wait_for_all_acked(Duration(seconds=10))
                 actions.publish(String(data=ACTIONS[sent[1] % len(ACTIONS)]))
                 sent[1] += 1
             sent[0] += 1
+            if sent[0] == 1:
+                # A subscriber that is known here may not know of this publisher yet.
+                for publisher in (states, actions):
+                    publisher.wait_for_all_acked(Duration(seconds=10))
+                start = time.monotonic()
         time.sleep(0.0005)
     for publisher in (states, actions):
         publisher.wait_for_all_acked(Duration(seconds=10))

@@ -1,4 +1,4 @@
-"""Trials of the recorder under load and faults, in a short form for tests and a long one for figures."""
+"""Trials of the recorder under load and faults: short for tests, long for figures."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ import select
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from load_publisher import ACTIONS
-from ros_processes import CHECKOUT, NodeProcess, Peer, own_domain, values_of, wait_until
+from ros_processes import CHECKOUT, NodeProcess, Peer, own_domain, values_of
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.storage.recording import is_recording, read_recording
@@ -78,8 +76,8 @@ class Killing:
     """Rows that were read afterwards."""
     lost: int = 0
     """Acknowledged rows that could not be read."""
-    wrong: int = 0
-    """Rows that were not in sequence, or not with the state that held."""
+    gaps: int = 0
+    """Rows whose action is not the one that follows that of the row before."""
     torn: int = 0
     """Tails that were torn, by the kill or by us after it."""
     noticed: int = 0
@@ -87,10 +85,8 @@ class Killing:
     files: int = 0
 
 
-def kill_recorders(
-    kills: int, directory: Path, chance: random.Random, longest: float = 7.0
-) -> Killing:
-    """Kills one recorder after another, each at a random moment of its life.
+def kill_recorders(kills: int, directory: Path, chance: random.Random) -> Killing:
+    """Kills one recorder after another at random moments, every fourth one while it starts.
 
     Each one begins in the directory that the others left.  Every second tail is torn further, by
     a part of a row as a loss of power leaves it.
@@ -99,31 +95,35 @@ def kill_recorders(
         kills: How many.
         directory: Working directory.
         chance: Chooses the moments.
-        longest: Longest life (seconds).
     """
     result = Killing()
     demonstrations = directory / "demonstrations"
-    with own_domain() as domain, Peer(domain) as peer, Load(domain, 1000, 50, 24) as load:
+    with own_domain() as domain, Peer(domain) as peer, Load(domain, 1000, 50, 24):
         for number in range(kills):
             peer.diagnostics.clear()
             seen = set(demonstrations.glob("*"))
             with NodeProcess("recorder_node", domain, directory) as recorder:
-                _pass(peer, chance.uniform(0, longest))
+                if number % 4 < 3:
+                    peer.wait_until(lambda: _acknowledged(peer), 60, "a row on /diagnostics")
+                _pass(peer, chance.uniform(0, 2.5))
                 recorder.stop(signal.SIGKILL)
                 _pass(peer, 0.2)
-            status = peer.diagnostics.get(RECORDER)
-            acknowledged = int(values_of(status)["rows"]) if status else 0
+            acknowledged = _acknowledged(peer)
             files = [one for one in set(demonstrations.glob("*")) - seen if is_recording(one)]
             result.kills += 1
             result.before_a_row += not acknowledged
             result.acknowledged += acknowledged
-            _examine(files, acknowledged, load.every, bool(number % 2), result)
+            _examine(files, acknowledged, bool(number % 2), result)
     return result
 
 
-def _examine(
-    files: list[Path], acknowledged: int, every: int, tear: bool, result: Killing
-) -> None:
+def _acknowledged(peer: Peer) -> int:
+    """Rows that the recorder has counted on /diagnostics."""
+    status = peer.diagnostics.get(RECORDER)
+    return int(values_of(status)["rows"]) if status else 0
+
+
+def _examine(files: list[Path], acknowledged: int, tear: bool, result: Killing) -> None:
     readable = 0
     for path in files:
         whole = read_recording(path)
@@ -134,21 +134,24 @@ def _examine(
         torn = tear or bool(whole.notes)
         result.torn += torn
         result.noticed += torn and "its last row is incomplete and left out" in read.notes
-        result.wrong += wrong_rows(read.demonstration, every)
+        result.gaps += gaps(read.demonstration)
         result.files += 1
         readable += len(read.demonstration)
     result.readable += readable
     result.lost += max(0, acknowledged - readable)
 
 
-def wrong_rows(demonstration: Demonstration, every: int) -> int:
-    """Rows that do not follow the row before, or that are not with the state that held."""
-    count = demonstration.states[:, 0]
-    in_turn = np.array([ACTIONS.index(demonstration.actions[code]) for code in demonstration.chosen])
-    expected = (count // every) % len(ACTIONS)
-    wrong = (count % every != 0) | (in_turn != expected)
-    wrong[1:] |= np.diff(count) != every
-    return int(wrong.sum())
+def gaps(demonstration: Demonstration) -> int:
+    """How often a row's action is not the one that was sent after that of the row before."""
+    place = {label: number for number, label in enumerate(ACTIONS)}
+    turn = np.array([place[label] for label in demonstration.actions])[demonstration.chosen]
+    return int((np.diff(turn) % len(ACTIONS) != 1).sum())
+
+
+def misplaced(demonstration: Demonstration, every: int) -> int:
+    """How many rows do not have the state that was sent just before their action."""
+    expected = every * np.arange(len(demonstration))
+    return int((demonstration.states[:, 0] != expected).sum())
 
 
 @dataclass
@@ -163,7 +166,9 @@ class Loading:
     messages: int
     """Received."""
     rows: int
-    wrong: int
+    gaps: int
+    misplaced: int
+    """Rows without the state that was sent just before their action."""
     lost_messages: int
     faults: list[str]
     memory: list[float] = field(default_factory=list)
@@ -218,7 +223,8 @@ def load_recorder(
             sent["actions"],
             int(values["messages"]),
             len(demonstration),
-            wrong_rows(demonstration, load.every),
+            gaps(demonstration),
+            misplaced(demonstration, load.every),
             int(values["messages lost"]),
             [f"{name}: {values[name]}" for name in known if values.get(name, "0") != "0"],
             memory,

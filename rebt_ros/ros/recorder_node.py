@@ -33,6 +33,9 @@ from rebt_ros.storage.recording import RecordingWriter
 #: Long enough that no message of a burst is lost while the disk is slow.
 _QUEUE: Final = 5000
 
+#: An action that came so long after it was sent may belong to another state (seconds).
+_LATE: Final = 1.0
+
 #: A state topic is silent after this long without a message (seconds).
 _SILENT: Final = 2.0
 
@@ -222,6 +225,14 @@ class RecorderNode(Node):
 
     def _on_action(self, topic: str, message: String, info: dict[str, Any]) -> None:
         received = self._note(topic, info)
+        late = (received - (info.get("source_timestamp") or received)) / 1e9
+        if late > _LATE:
+            self._faults.note(
+                "late action",
+                f"an action on {topic!r} came {late:.1f} s after it was sent and has the state of "
+                "its arrival: wait until recorder and publisher know each other, and check that "
+                "their clocks agree.",
+            )
         self._queue(
             received, partial(self._session.act, self._stamp(received), topic, message.data)
         )
