@@ -212,7 +212,7 @@ def load_recorder(
                 "the last row",
             )
             values = values_of(peer.diagnostics[RECORDER])
-            cpu = _cpu(recorder.process.pid) / seconds
+            cpu = cpu_seconds(recorder.process.pid) / seconds
         assert recorder.stop() == 0
         known = ("rows lost", "messages lost", "message lost", "write error")
         (path,) = (directory / "demonstrations").iterdir()
@@ -245,6 +245,6 @@ def _resident(pid: int) -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def _cpu(pid: int) -> float:
+def cpu_seconds(pid: int) -> float:
     ticks = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]
     return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")

@@ -299,12 +299,13 @@ def changed(field, value, kind=None):
         (changed("state", (np.nan, 0.0)), "'front' is nan in row 1"),
         (changed("state", (0.0, -np.inf)), "'left, \"near\"' is -inf in row 1"),
         (changed("state", (1e39, 0.0)), "is 1e\\+39 in row 1, which is not within"),
-        (changed("action", 7, "label"), "the numbers of its labels have a gap"),
-        (changed("action", 2, "label"), "the numbers of its labels have a gap"),
+        (changed("action", 7, "label"), "the numbers of its labels are not in order"),
+        (changed("action", 2, "label"), "the numbers of its labels are not in order"),
         (changed("last_action", 0, "label"), "a label is not printable"),
         (changed("last_action", 3, "label"), "a label is not printable"),
         (changed("state", np.frombuffer(b"\xff" * 16), "label"), "a label is not UTF-8"),
-        (lambda records: records[1:], "the numbers of its labels have a gap"),
+        (lambda records: np.concatenate([records, records]), "the numbers of its labels are not"),
+        (lambda records: records[1:], "the numbers of its labels are not in order"),
     ],
 )
 def test_what_no_recorder_writes_is_named_in_one_sentence(tmp_path, change, message):
