@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import random
 import resource
+import signal
 from pathlib import Path
 
 import pytest
@@ -91,6 +92,28 @@ def test_a_full_disk_is_an_error_until_there_is_room(
     assert len(first.demonstration) == 10
     assert last.demonstration.actions[-1] in ("last", "refused")
     assert len(recordings(directory)) == len(list(directory.iterdir()))
+
+
+def test_lost_messages_are_counted_and_warned_of(domain: int, peer: Peer, tmp_path: Path) -> None:
+    with NodeProcess("recorder_node", domain, tmp_path) as recorder:
+        peer.state(0.0)
+        # Two reports with one publisher, between which gaps count.
+        peer.wait_until(lambda: RECORDER in peer.diagnostics)
+        peer.diagnostics.clear()
+        peer.wait_until(lambda: RECORDER in peer.diagnostics)
+        recorder.process.send_signal(signal.SIGSTOP)
+        for number in range(8000):
+            peer.state(float(number))
+        recorder.process.send_signal(signal.SIGCONT)
+
+        def told() -> bool:
+            peer.state(0.0)
+            return int(values_of(peer.diagnostics[RECORDER])["messages lost"]) > 0
+
+        peer.wait_until(told)
+        assert peer.diagnostics[RECORDER].level == b"\1"
+        assert "were lost" in peer.diagnostics[RECORDER].message
+        assert recorder.stop() == 0
 
 
 def test_two_recorders_in_one_directory_do_not_mix_rows(
