@@ -266,7 +266,7 @@ def test_a_disk_that_does_not_keep_rows_is_an_error(tmp_path, monkeypatch):
     writer.write(ROWS[0])
     monkeypatch.setattr(recording.os, "fsync", refuse)
     for end in (writer.sync, writer.close):
-        with pytest.raises(RecordingError, match="may not be complete .*: check the disk"):
+        with pytest.raises(RecordingError, match=r"may not be complete .*: check the disk"):
             end()
     writer.close()
 
