@@ -33,7 +33,7 @@ def test_kills_lose_no_acknowledged_row_and_recording_goes_on(tmp_path: Path) ->
 
 
 def test_load_loses_no_message_and_no_row(tmp_path: Path) -> None:
-    result = load_recorder(5.0, tmp_path)
+    result = load_recorder(4.0, tmp_path)
     assert result.messages == result.states + result.actions, result
     assert result.rows == result.actions
     assert (result.gaps, result.lost_messages, result.faults) == (0, 0, [])
