@@ -185,15 +185,15 @@ def test_a_pruned_tree_has_the_ranges_of_the_leaves_that_are_left() -> None:
 
 
 def test_a_tree_of_very_many_leaves_keeps_a_bounded_number_of_ranges() -> None:
-    rows = 2000
+    rows = 1000
     table = some.table(
-        [(value, 5.0, 0.0) for value in range(rows)], [0, 2] * 1000, features=FEATURES
+        [(value, 5.0, 0.0) for value in range(rows)], [0, 2] * 500, features=FEATURES
     )
     leaves = shown_rows(table, train(table, last_action=False)).leaves
     assert len(leaves) == MOST_SHOWN_LEAVES
-    assert {leaf.rows for leaf in leaves} == {8}
+    assert {leaf.rows for leaf in leaves} == {4}
     spans = [leaf.values[0] for leaf in leaves]
-    assert spans == [Span(first, first + 7.0) for first in range(0, rows, 8)]
+    assert spans == [Span(first, first + 3.0) for first in range(0, rows, 4)]
     wide = tuple(Feature(f"f{place}", topic="state", index=place) for place in range(500))
     table = some.table([(row,) * 500 for row in range(100)], [0, 2] * 50, features=wide)
     assert len(shown_rows(table, train(table, last_action=False)).leaves) == 20

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from py_trees.common import Status
+from rclpy.duration import Duration
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.validate_topic_name import validate_topic_name
@@ -81,6 +82,11 @@ class CommandChannels:
             channel.close()
 
     @property
+    def topics(self) -> frozenset[str]:
+        """The full names of the topics that commands are sent on."""
+        return frozenset(channel.topic for channel in self._channels.values())
+
+    @property
     def sent(self) -> dict[str, str | None]:
         """The latest command of each channel; None where it rests."""
         return {name: channel.sent for name, channel in self._channels.items()}
@@ -101,6 +107,16 @@ class CommandChannels:
         return sum(
             self._channels[name].send(label, self._every_tick) for name, label in latest.items()
         )
+
+    def send_to_all(self, label: str) -> None:
+        """Sends a command that is none of the tree's on every channel."""
+        for channel in self._channels.values():
+            channel.publish(label)
+
+    def settle(self, seconds: float) -> None:
+        """Waits until all commands have arrived, but no longer than that on each channel."""
+        for channel in self._channels.values():
+            channel.settle(seconds)
 
     def rest(self) -> None:
         """What is commanded next is sent, be it what was commanded last."""
@@ -137,9 +153,19 @@ class _Channel:
         started = self.results is not None and self.results.started
         due = every_tick or started or label != self.sent
         if due:
-            self._publisher.publish(String(data=label))
+            self.publish(label)
         self.sent = label
         return due
+
+    @property
+    def topic(self) -> str:
+        return str(self._publisher.topic_name)
+
+    def publish(self, label: str) -> None:
+        self._publisher.publish(String(data=label))
+
+    def settle(self, seconds: float) -> None:
+        self._publisher.wait_for_all_acked(Duration(seconds=seconds))
 
     def close(self) -> None:
         self._node.destroy_publisher(self._publisher)
