@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from py_trees.common import Status
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import String
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.errors import DocumentError
 from rebt_ros.ros.action_results import ActionResults
+
+#: Of the topic on which the executor says whether it drives; who comes later hears the latest.
+DRIVING_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def topic_of(base: str, channel: str, channels: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import SetBool
 
 from rebt_ros.behavior_tree import nodes
@@ -24,7 +24,7 @@ from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.background import Background
-from rebt_ros.ros.command_channels import CommandChannels
+from rebt_ros.ros.command_channels import DRIVING_QOS, CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.executor_settings import declare_settings
 from rebt_ros.ros.novelty_guard import NoveltyGuard
@@ -86,6 +86,8 @@ class ExecutorNode(Node):
         self._last_snapshot = ""
         self._watchers = 0
         self._snapshot = self.create_publisher(String, "~/snapshot", 10)
+        self._driving = self.create_publisher(Bool, "~/driving", DRIVING_QOS)
+        self._said_to_drive: bool | None = None
         self._begin()
 
     def _begin(self) -> None:
@@ -111,6 +113,7 @@ class ExecutorNode(Node):
         self.create_timer(1.0 / self._settings.rate, self._tick, clock=self._time)
         self.create_timer(_SNAPSHOT_PERIOD, self._publish_snapshot, clock=steady)
         self._diagnostics = Diagnostics(self, "execution", self._report)
+        self._say_who_drives()
         self.get_logger().info(
             f"{'enabled' if self._enabled else 'disabled until ~/enable is called'}: "
             f"{self._condition()}."
@@ -157,6 +160,7 @@ class ExecutorNode(Node):
                 return
         self._candidate = None
         self._install(candidate)
+        self._say_who_drives()
 
     def _unheard(self, program: TreeProgram) -> list[str]:
         return [topic for topic in program.inputs.topics if topic not in self._latest]
@@ -215,6 +219,7 @@ class ExecutorNode(Node):
             self._channels.rest()
             self._guard.release()
         self._moving = self._enabled and self._program is not None
+        self._say_who_drives()
         channels = self._program.channels if self._program else [topic]
         channel = channel_of(topic, channels, self._settings.takeover.topics)
         if message.data and channel is not None:
@@ -242,6 +247,7 @@ class ExecutorNode(Node):
             self._guard.release()
         else:
             self._disable()
+        self._say_who_drives()
         response.success = True
         response.message = f"enabled: {self._condition()}." if self._enabled else "disabled."
         self.get_logger().info(response.message)
@@ -259,6 +265,7 @@ class ExecutorNode(Node):
         program, now = self._program, self._now()
         if program is None or not self._enabled or self._takeover.lasts(now):
             return
+        self._say_who_drives()
         if program.inputs.stale(now) or not self._is_familiar(program):
             self._rest()
             return
@@ -301,6 +308,14 @@ class ExecutorNode(Node):
         self._resting = True
 
     # --- what it says ---
+
+    def _say_who_drives(self) -> None:
+        """Tells others, above all the recorder, whether the robot is in the tree's hands."""
+        ready = self._enabled and self._program is not None
+        driving = ready and not self._takeover.lasts(self._now())
+        if driving != self._said_to_drive:
+            self._said_to_drive = driving
+            self._driving.publish(Bool(data=driving))
 
     def _now(self) -> int:
         return int(self._time.now().nanoseconds)

@@ -29,7 +29,7 @@ class NoveltyGuard:
     def __init__(self, mode: Novelty) -> None:
         self._mode = mode
         self.departure: Departure | None = None
-        """How the latest state, or the one that the robot is held for, differs from what was shown."""
+        """How the latest state, or the one it is held for, differs from what was shown."""
         self.holding = False
         """Whether the robot is held."""
 
