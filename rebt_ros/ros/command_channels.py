@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from py_trees.common import Status
-from rclpy.duration import Duration
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -118,11 +117,6 @@ class CommandChannels:
         for channel in self._channels.values():
             channel.publish(label)
 
-    def settle(self, seconds: float) -> None:
-        """Waits until all commands have arrived, but no longer than that on each channel."""
-        for channel in self._channels.values():
-            channel.settle(seconds)
-
     def rest(self) -> None:
         """What is commanded next is sent, be it what was commanded last."""
         for channel in self._channels.values():
@@ -168,9 +162,6 @@ class _Channel:
 
     def publish(self, label: str) -> None:
         self._publisher.publish(String(data=label))
-
-    def settle(self, seconds: float) -> None:
-        self._publisher.wait_for_all_acked(Duration(seconds=seconds))
 
     def close(self) -> None:
         self._node.destroy_publisher(self._publisher)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
 from functools import partial
 from typing import Any, Final
@@ -41,8 +42,8 @@ _STATE_QOS: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFOR
 #: Least time between two snapshots (seconds).
 _SNAPSHOT_PERIOD: Final = 0.2
 
-#: How long the answer to a disabling call waits for commands that are under way (seconds).
-_LAST_COMMANDS: Final = 0.2
+#: How long another thread may keep a tick waiting (seconds); Python's default is 5 ms.
+_HAND_OVER: Final = 0.0005
 
 _REFUSED: Final = "refused trees"
 _NOVEL: Final = "states outside what was shown"
@@ -231,6 +232,9 @@ class ExecutorNode(Node):
         if self._program is not None:
             self._program.inputs.forget()
         self._takeover.restart(self._now())
+        # Time may stand still now, and the next tick be far away.
+        if self._enabled and not self._takeover.lasts(self._now()):
+            self._rest()
 
     def _note_result(self, text: str) -> None:
         self._faults.note(
@@ -258,8 +262,6 @@ class ExecutorNode(Node):
         self._moving = self._moving and not self._takeover.lasts(self._now())
         self._rest()
         self._enabled = False
-        # No command may arrive after the answer, also not one that had to be sent again.
-        self._channels.settle(_LAST_COMMANDS)
 
     def _tick(self) -> None:
         program, now = self._program, self._now()
@@ -396,6 +398,8 @@ class ExecutorNode(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Runs the executor."""
+    # The thread that reads trees hands the interpreter over to a tick that is due.
+    sys.setswitchinterval(_HAND_OVER)
     lifetime.run(ExecutorNode, args)
 
 
