@@ -266,7 +266,8 @@ def test_a_tree_whose_topic_has_too_few_values_is_refused_and_the_old_one_goes_o
             return values_of(one)["refused trees"] == "2"
 
         robot.until(refused)
-        executor.says("state topic 'other' sends 1 values where the tree reads 3")
+        said = peer.diagnostics["executor: execution"].message
+        assert "state topic 'other' sends 1 values where the tree reads 3" in said
         robot.obeys("go")
         assert set(_labels(robot.commands)) == {"go"}
         publish(peer, reading("other", 2))

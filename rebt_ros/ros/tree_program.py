@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -41,7 +42,7 @@ class TreeProgram:
 
 
 class Preparation:
-    """Makes programs; may be used in any thread, one at a time.
+    """Makes programs; may be used in any thread, one at a time, and `retire` at any time.
 
     Args:
         settings: The executor's parameters.
@@ -58,9 +59,16 @@ class Preparation:
         self._settings = settings
         self._commander = commander
         self._histories = histories
+        self._retired: deque[TreeProgram] = deque()
+
+    def retire(self, program: TreeProgram) -> None:
+        """Has the next call of `read` take a program apart that is not needed any more."""
+        self._retired.append(program)
 
     def read(self, document: str) -> TreeProgram | DocumentError:
         """The program of a document, or why there is none; never raises."""
+        while self._retired:
+            self._retired.popleft().runtime.dismantle()
         return _refusal_or(lambda: self.program(loads(document), document))
 
     def program(self, learned: LearnedTree, document: str) -> TreeProgram:
@@ -112,12 +120,11 @@ def _refusal_or(make: Callable[[], TreeProgram]) -> TreeProgram | DocumentError:
     try:
         return make()
     except DocumentError as err:
-        return err
+        # Without the traceback, which keeps the whole document in memory.
+        return DocumentError(str(err))
     except Exception as err:
         # Whatever a document does to the one that reads it, the robot's tree goes on.
-        refusal = DocumentError(
+        return DocumentError(
             f"it cannot be read, which is a mistake in rebt_ros ({type(err).__name__}): "
             "please report it, with the document."
         )
-        refusal.__cause__ = err
-        return refusal
