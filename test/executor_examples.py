@@ -36,7 +36,10 @@ def where_x_is_small(small: Action, otherwise: Action) -> Node:
     return Selector((Sequence((Condition(Literal(Threshold("x", 0.5))), small)), otherwise))
 
 
-def status(peer: Peer, condition: str, *, robot: Robot | None = None, **values: str) -> Any:
+READS_X = learned(where_x_is_small(GO, TURN))
+
+
+def status(peer: Peer, condition: str, *, robot: Any = None, **values: str) -> Any:
     """Waits until the executor reports a condition; a robot sends its state meanwhile."""
 
     def reported() -> Any:

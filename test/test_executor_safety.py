@@ -18,6 +18,7 @@ pytest.importorskip("rclpy")
 
 from executor_examples import (
     GO,
+    READS_X,
     STOP,
     TURN,
     Robot,
@@ -38,8 +39,6 @@ from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.behavior_tree.nodes import Condition, Selector, Sequence
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import LastActionIs, Literal
-
-READS_X = learned(where_x_is_small(GO, TURN))
 
 
 def _labels(commands: list[Any]) -> list[str]:
