@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -63,17 +65,17 @@ class Course:
         self.robot = Corridor(closed)
         self.commands.clear()
 
-    def until(self, condition: object, what: str = "") -> None:
-        def moved() -> bool:
+    def until(self, condition: Callable[[], Any], what: str = "") -> Any:
+        def moved() -> Any:
             self._peer.state(*self.robot.state, labels=FIELDS)
-            return bool(condition())  # type: ignore[operator]
+            return condition()
 
-        self._peer.wait_until(moved, what=what)
+        return self._peer.wait_until(moved, what=what)
 
-    def demonstrate(self, condition: object) -> int:
+    def demonstrate(self, condition: Callable[[], bool]) -> int:
         """A person drives until the condition holds; returns how many actions that took."""
         done = 0
-        while not condition():  # type: ignore[operator]
+        while not condition():
             state = self.robot.state
             self._peer.state(*state, labels=FIELDS)
             self._peer.action(show(state))

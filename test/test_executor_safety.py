@@ -275,7 +275,7 @@ def test_a_tree_whose_topic_has_too_few_values_is_refused_and_the_old_one_goes_o
             other.publish(Float64MultiArray(data=[0.0, 0.0, 0.0]))
             return robot.commands[-1].data == "stop"
 
-        robot.until(fits)
+        peer.wait_until(fits)
 
 
 # --- a person takes over ----------------------------------------------------------------------
