@@ -244,6 +244,33 @@ def test_rows_are_not_acknowledged_into_a_removed_file(tmp_path):
             writer.write(ROWS[0])
 
 
+def test_rows_are_synced_when_asked_for_and_at_the_end(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr(recording.os, "fsync", lambda descriptor: synced.append(descriptor))
+    with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:
+        writer.write(ROWS[0])
+        assert synced == []
+        writer.sync()
+        # The file, and once its name.
+        assert len(synced) == 2
+        writer.sync()
+        assert len(synced) == 3
+    assert len(synced) == 4
+
+
+def test_a_disk_that_does_not_keep_rows_is_an_error(tmp_path, monkeypatch):
+    def refuse(_):
+        raise OSError(5, "Input/output error")
+
+    writer = RecordingWriter(tmp_path, FEATURES, ["/action"])
+    writer.write(ROWS[0])
+    monkeypatch.setattr(recording.os, "fsync", refuse)
+    for end in (writer.sync, writer.close):
+        with pytest.raises(RecordingError, match=r"may not be complete .*: check the disk"):
+            end()
+    writer.close()
+
+
 def test_a_directory_that_cannot_be_is_an_error(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(RecordingError, match="no recording can be created"):
@@ -299,12 +326,13 @@ def changed(field, value, kind=None):
         (changed("state", (np.nan, 0.0)), "'front' is nan in row 1"),
         (changed("state", (0.0, -np.inf)), "'left, \"near\"' is -inf in row 1"),
         (changed("state", (1e39, 0.0)), "is 1e\\+39 in row 1, which is not within"),
-        (changed("action", 7, "label"), "the numbers of its labels have a gap"),
-        (changed("action", 2, "label"), "the numbers of its labels have a gap"),
+        (changed("action", 7, "label"), "the numbers of its labels are not in order"),
+        (changed("action", 2, "label"), "the numbers of its labels are not in order"),
         (changed("last_action", 0, "label"), "a label is not printable"),
         (changed("last_action", 3, "label"), "a label is not printable"),
         (changed("state", np.frombuffer(b"\xff" * 16), "label"), "a label is not UTF-8"),
-        (lambda records: records[1:], "the numbers of its labels have a gap"),
+        (lambda records: np.concatenate([records, records]), "the numbers of its labels are not"),
+        (lambda records: records[1:], "the numbers of its labels are not in order"),
     ],
 )
 def test_what_no_recorder_writes_is_named_in_one_sentence(tmp_path, change, message):

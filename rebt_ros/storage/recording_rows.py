@@ -181,7 +181,8 @@ class _Columns:
         self._states = np.empty((room, len(head.features)))
         self._stamps, self._actions, self._channel = np.empty((3, room), dtype=np.int64)
         self._rows = 0
-        self._labels: dict[int, bytes] = {}
+        self._labels: list[bytearray] = []
+        self._goes_on = False
         self._before: dict[int, int] = {}
 
     def add(self, records: Records) -> None:
@@ -189,9 +190,9 @@ class _Columns:
         labels = records["channel"] == LABEL
         if labels.any():
             for record in records[labels]:
-                text = record["state"].tobytes()[: record["last_action"]]
-                number = int(record["action"])
-                self._labels[number] = self._labels.get(number, b"") + text
+                self._add_label(
+                    int(record["action"]), record["state"].tobytes(), int(record["last_action"])
+                )
             records = records[~labels]
         if not len(records):
             return
@@ -235,12 +236,18 @@ class _Columns:
             },
         )
 
+    def _add_label(self, number: int, content: bytes, size: int) -> None:
+        if number == len(self._labels) + 1:
+            self._labels.append(bytearray())
+        elif number != len(self._labels) or not self._goes_on:
+            raise self._wrong("the numbers of its labels are not in order")
+        self._labels[-1] += content[:size]
+        # Only a part that is full is followed by another one.
+        self._goes_on = size == len(content)
+
     def _decoded(self) -> tuple[str, ...]:
-        numbers = sorted(self._labels)
-        if numbers != list(range(1, len(numbers) + 1)):
-            raise self._wrong("the numbers of its labels have a gap")
         try:
-            labels = tuple(self._labels[number].decode() for number in numbers)
+            labels = tuple(label.decode() for label in self._labels)
         except UnicodeDecodeError as err:
             raise self._wrong("a label is not UTF-8") from err
         if not all(map(is_label, labels)) or len(set(labels)) < len(labels):
