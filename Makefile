@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench-reduction bench-recorder lint format clean
+.PHONY: help setup build demo test bench-reduction bench-recorder experiment lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -52,6 +52,9 @@ bench-recorder: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 bench-recorder: setup ## Kill, load and measure the recorder (KILLS=50; ARGS="..." for options).
 	@PYTHONPATH=.:test:$$PYTHONPATH $(VENV_PYTHON) test/benchmarks/recorder.py --kills $(or $(KILLS),50) $(ARGS)
 
+experiment: setup ## Reproduce the paper's experiments on ../shared/experiments (ARGS="..." for options).
+	@$(VENV_PYTHON) -m rebt_ros.commands.experiment ../shared/experiments $(ARGS)
+
 lint: setup ## Check style, formatting and types.
 	@status=0; \
 	$(VENV_PYTHON) -m ruff check $(SOURCES) || status=$$?; \
@@ -64,5 +67,5 @@ format: setup ## Format the code and sort its imports.
 	@$(VENV_PYTHON) -m ruff format $(SOURCES)
 
 clean: ## Remove what was built (not .venv).
-	rm -rf build install log demo-results bench-results .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf build install log demo-results bench-results experiment-results .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find rebt_ros test -name __pycache__ -prune -exec rm -rf {} +
