@@ -62,7 +62,7 @@ def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:
         return ()
     read = corpus(shown)
     offered: dict[nodes.Node, FoundRoutine] = {}
-    for _, program in programs(shown, read)[:_MOST_PROGRAMS]:
+    for program in programs(shown, read)[:_MOST_PROGRAMS]:
         model = Model(program, read)
         model.fit(_THOROUGH)
         found = _Reading(model, shown, table.features).routines(table.channel)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from random import Random
+from typing import NamedTuple
 
 from rebt_ros.routines.corpus import Corpus
 from rebt_ros.routines.likelihood import Model
@@ -10,52 +11,74 @@ from rebt_ros.routines.moments import Moments, Word
 from rebt_ros.routines.moves import MOST_STATES, neighbours
 from rebt_ros.routines.program import Program, Routine, Stream, states_needed, tidy
 
-#: Searches, each from a word of its own, and how often streams of what they found are put together
-#: anew.
+#: Searches that begin with a word, those of them that are brought to an end, and how often streams
+#: of what they found are put together anew.
 _BEGINNINGS = 4
+_FINALISTS = 2
 _RECOMBINATIONS = 3
-#: Programs that a search looks at at first, and that the best one looks at further.
+#: Programs that a search looks at at first, and to the end.
 _FEW, _MANY = 250, 1000
-#: How often what is repeated is repeated; more is as good as for ever.
-_ROUNDS = (2, 3, 4)
+#: How often what is repeated is taken to be repeated, and what is tried in the end.
+_ROUNDS = 3
+_OTHER_ROUNDS = (2, 4, 5, 6)
 #: Words that a search may begin with, and the longest of them.
 _CANDIDATES = 12
 _LONGEST = 18
 #: Programs that are judged before the best of them is taken.
 _AT_ONCE = 40
 #: Rounds of expectation maximization: at first sight, and before a program is taken.
-_GLANCE, _LOOK = 1, 5
+_GLANCE, _LOOK = 1, 4
 #: What a program must gain at first sight to be taken at once, and at a closer look, in nats.
 _PROMISING, _GAIN = -40.0, 3.0
 #: Programs that get a closer look when none was taken at once.
 _CLOSER = 8
 
 
-def programs(moments: Moments, corpus: Corpus) -> list[tuple[float, Program]]:
-    """Programs that explain the moments, the best first, with their scores in nats."""
-    rounds, found = _repeated(moments, corpus)
-    others = [_first(corpus), *_beginnings(moments, corpus, rounds)[1:_BEGINNINGS]]
-    found += [_climb(_score(one, corpus, _LOOK), one, corpus, rounds, _FEW) for one in others]
-    best = _climb(*max(found), corpus, rounds, _MANY)
+class _Judged(NamedTuple):
+    """A program with what it is worth."""
+
+    score: float
+    """In nats."""
+    program: Program
+    model: Model
+
+    @property
+    def rank(self) -> tuple[float, Program]:
+        """Orders programs, those of one worth as well."""
+        return self.score, self.program
+
+
+def programs(moments: Moments, corpus: Corpus) -> list[Program]:
+    """Programs that explain the moments, the best first."""
+    rounds = _ROUNDS
+    begun = [_first(corpus), *_beginnings(moments, corpus, rounds)]
+    found = [_climb(_judge(one, corpus, _LOOK), corpus, rounds, _FEW) for one in begun]
+    found.sort(key=lambda one: one.rank, reverse=True)
+    found[:_FINALISTS] = [_climb(one, corpus, rounds, _MANY) for one in found[:_FINALISTS]]
+    best = max(found, key=lambda one: one.rank)
     for _ in range(_RECOMBINATIONS):
-        streams = dict.fromkeys(stream for _, program in found for stream in program)
-        better = _recombined(*best, list(streams), corpus)
+        streams = dict.fromkeys(stream for one in found for stream in one.program)
+        better = _recombined(best, list(streams), corpus)
         if better is None:
             break
+        best = _climb(better, corpus, rounds, _MANY)
         found.append(best)
-        best = _climb(*better, corpus, rounds, _MANY)
-    found.append(best)
-    return sorted({program: (score, program) for score, program in found}.values(), reverse=True)
+    for times in _OTHER_ROUNDS:
+        program = _with_rounds(best.program, times)
+        if program != best.program and states_needed(program) <= MOST_STATES:
+            other = _judge(program, corpus, _LOOK, best.model)
+            if other.score > best.score + _GAIN:
+                best = _climb(other, corpus, times, _MANY)
+                found.append(best)
+    found.sort(key=lambda one: one.rank, reverse=True)
+    return list(dict.fromkeys(one.program for one in found))
 
 
-def _repeated(moments: Moments, corpus: Corpus) -> tuple[int, list[tuple[float, Program]]]:
-    """How often repeated routines are repeated, by what is found if they were."""
-    found: dict[tuple[float, Program], int] = {}
-    for times in _ROUNDS:
-        for program in _beginnings(moments, corpus, times)[:1]:
-            start = _score(program, corpus, _LOOK)
-            found[_climb(start, program, corpus, times, _FEW)] = times
-    return (found[max(found)] if found else _ROUNDS[0]), list(found)
+def _with_rounds(program: Program, rounds: int) -> Program:
+    return tuple(
+        tuple(Routine(rounds if one.rounds > 1 else 1, one.steps) for one in stream)
+        for stream in program
+    )
 
 
 def _first(corpus: Corpus) -> Program:
@@ -70,16 +93,16 @@ def _beginnings(moments: Moments, corpus: Corpus, rounds: int) -> list[Program]:
         for word, count in zip(moments.words, moments.counts.tolist(), strict=True)
         if count > 1 and len(word) <= _LONGEST
     ]
-    longest = [word for _, word in sorted(often, key=lambda one: (-one[0], one[1]))]
+    longest = (word for _, word in sorted(often, key=lambda one: (-one[0], one[1])))
     folded = dict.fromkeys(tidy((fold(word, rounds),)) for word in longest)
     fitting = [one for one in folded if states_needed(one) <= MOST_STATES][:_CANDIDATES]
-    return sorted(fitting, key=lambda one: _score(one, corpus, _LOOK), reverse=True)
+    judged = sorted((_judge(one, corpus, _GLANCE).rank for one in fitting), reverse=True)
+    return [program for _, program in judged[:_BEGINNINGS]]
 
 
-def _recombined(
-    best: float, program: Program, streams: list[Stream], corpus: Corpus
-) -> tuple[float, Program] | None:
+def _recombined(best: _Judged, streams: list[Stream], corpus: Corpus) -> _Judged | None:
     """The program with a stream of another one, if that is better."""
+    program = best.program
     changed = dict.fromkeys(
         (*program[:place], stream, *program[end:])
         for stream in streams
@@ -87,7 +110,7 @@ def _recombined(
         for end in range(place, len(program) + 1)
     )
     judged = [
-        (_score(one, corpus, _GLANCE), one)
+        _judge(one, corpus, _GLANCE, best.model)
         for one in changed
         if one != program and states_needed(one) <= MOST_STATES
     ]
@@ -112,44 +135,41 @@ Routine(rounds=1, steps=((3,),)))
     return (Routine(1, tuple((action,) for action in word)),) if word else ()
 
 
-def _climb(
-    best: float, program: Program, corpus: Corpus, rounds: int, most: int
-) -> tuple[float, Program]:
+def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
     """Takes better neighbours until there is none, or enough have been looked at."""
     draw = Random(0)
-    seen = {program}
+    seen = {best.program}
     looked = 0
     while looked < most:
-        waiting = [one for one in neighbours(program, corpus, rounds) if one not in seen]
+        waiting = [one for one in neighbours(best.program, corpus, rounds) if one not in seen]
         draw.shuffle(waiting)
-        least = _score(program, corpus, _GLANCE) + _PROMISING
-        glanced: list[tuple[float, Program]] = []
+        glanced: list[_Judged] = []
         better = None
         while waiting and better is None:
             some, waiting = waiting[:_AT_ONCE], waiting[_AT_ONCE:]
             seen.update(some)
             looked += len(some)
-            judged = [(_score(one, corpus, _GLANCE), one) for one in some]
+            judged = [_judge(one, corpus, _GLANCE, best.model) for one in some]
             glanced += judged
-            if max(judged)[0] > least:
-                better = _better_than(best, [max(judged)], corpus)
+            first = max(judged, key=lambda one: one.rank)
+            if first.score > best.score + _PROMISING:
+                better = _better_than(best, [first], corpus)
         better = better or _better_than(best, glanced, corpus)
         if better is None:
             break
-        best, program = better
-    return best, program
+        best = better
+    return best
 
 
-def _better_than(
-    best: float, judged: list[tuple[float, Program]], corpus: Corpus
-) -> tuple[float, Program] | None:
+def _better_than(best: _Judged, judged: list[_Judged], corpus: Corpus) -> _Judged | None:
     """The first of the most promising programs that is better at a closer look."""
-    for _, program in sorted(judged, reverse=True)[:_CLOSER]:
-        score = _score(program, corpus, _LOOK)
-        if score > best + _GAIN:
-            return score, program
+    for one in sorted(judged, key=lambda one: one.rank, reverse=True)[:_CLOSER]:
+        closer = one._replace(score=one.model.fit(_LOOK))
+        if closer.score > best.score + _GAIN:
+            return closer
     return None
 
 
-def _score(program: Program, corpus: Corpus, rounds: int) -> float:
-    return Model(program, corpus).fit(rounds)
+def _judge(program: Program, corpus: Corpus, rounds: int, like: Model | None = None) -> _Judged:
+    model = Model(program, corpus, like)
+    return _Judged(model.fit(rounds), program, model)
