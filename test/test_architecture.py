@@ -63,6 +63,7 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 
 #: Libraries with a home: the only modules that import them.
 HOMES: Final = {
+    "apsw": ("rebt_ros.storage.bag_safety",),
     "imblearn": ("rebt_ros.decision_tree.upsampling",),
     "jsonschema": (),
     "joblib": ("rebt_ros.commands.bench_*",),

@@ -34,7 +34,7 @@ DECLARED_AS: Final = {
 }
 
 #: Imported only where they are installed.
-OPTIONAL: Final = {"imblearn", "matplotlib"}
+OPTIONAL: Final = {"apsw", "imblearn", "matplotlib"}
 
 needs_installation = pytest.mark.skipif(
     INSTALLED == CHECKOUT / PACKAGE, reason="run from the checkout, not by 'make test'"
