@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench-reduction lint format clean
+.PHONY: help setup build demo test bench-reduction fuzz lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -47,6 +47,14 @@ test: build ## Run the tests on the built package.
 
 bench-reduction: setup ## Compare the sizes of BT-Espresso's trees and ours (ARGS="..." for options).
 	@$(VENV_PYTHON) -m rebt_ros.commands.bench_reduction ../shared/experiments $(ARGS)
+
+# Sizes are multiplied by SCALE; a SEED makes the same inputs again.
+fuzz: SCALE ?= 1
+fuzz: SEED ?=
+fuzz: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+fuzz: setup ## Throw mutated input at all readers and at a running executor (SCALE=0.1, SEED=7, ARGS="...").
+	@PYTHONPATH=test:. $(VENV_PYTHON) -m fuzz --scale $(SCALE) $(if $(SEED),--seed $(SEED)) \
+	    --output bench-results/fuzz.json $(ARGS)
 
 lint: setup ## Check style, formatting and types.
 	@status=0; \

@@ -104,8 +104,11 @@ class Faults:
         self._latest = (sentence, now)
         if now - self._logged.get(kind, -math.inf) >= _QUIET:
             self._logged[kind] = now
-            log = self._logger.error if severe else self._logger.warning
-            log(sentence)
+            # Two lines: rclpy refuses to log from one line with a severity, then with another.
+            if severe:
+                self._logger.error(sentence)
+            else:
+                self._logger.warning(sentence)
 
     @property
     def recent(self) -> str:

@@ -11,11 +11,9 @@ from typing import Any, Final
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
-from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool
 
@@ -30,6 +28,7 @@ from rebt_ros.ros import lifetime
 from rebt_ros.ros.command_channels import CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.topic_names import check_topics
 from rebt_ros.ros.tree_inputs import Message, TreeInputs
 from rebt_ros.storage.tree_file import read_tree
 
@@ -153,15 +152,10 @@ class ExecutorNode(Node):
                 "put the policies of several channels side by side under a Parallel."
             )
         inputs = self._new_inputs(learned)
-        for topic in inputs.topics:
-            try:
-                validate_topic_name(topic)
-            except InvalidTopicNameException as err:
-                raise DocumentError(
-                    f"the tree reads the state topic {topic!r}, an invalid name."
-                ) from err
+        channels = sorted({action.channel for action in learned.actions})
+        check_topics(self, inputs.topics, self._channels.topics_of(channels))
         self._rest()
-        self._channels.follow(sorted({action.channel for action in learned.actions}))
+        self._channels.follow(channels)
         histories = self._runtime.histories if self._runtime else {}
         runtime = TreeRuntime(learned, self._channels, executable(learned.tree), histories)
         known = {} if self._inputs is None else self._inputs.latest

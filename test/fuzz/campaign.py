@@ -13,8 +13,7 @@ from pathlib import Path
 from random import Random
 from typing import Any, Final
 
-from fuzz.target import Target, targets
-
+from fuzz.target import Target, target
 from rebt_ros.errors import RebtError
 
 #: An input that takes longer is a hang (seconds).
@@ -68,23 +67,23 @@ def generator(target: str, seed: int, number: int) -> Random:
     return Random(f"{seed} {target} {number}")
 
 
-def run(target: Target, seed: int, numbers: range) -> Outcome:
+def run(reader: Target, seed: int, numbers: range) -> Outcome:
     """Reads inputs in this process."""
-    outcome = Outcome(target.name, seed)
-    for _ in each(target, outcome, numbers):
+    outcome = Outcome(reader.name, seed)
+    for _ in each(reader, outcome, numbers):
         pass
     return outcome
 
 
-def each(target: Target, outcome: Outcome, numbers: range) -> Iterator[int]:
+def each(reader: Target, outcome: Outcome, numbers: range) -> Iterator[int]:
     """Reads one input after the other; yields the number of the next one before it is read."""
     before = _peak()
     for number in numbers:
         yield number
-        made = target.make(generator(target.name, outcome.seed, number))
+        made = reader.make(generator(reader.name, outcome.seed, number))
         began = time.perf_counter()
         try:
-            target.read(made)
+            reader.read(made)
             outcome.accepted += 1
         except RebtError as err:
             outcome.refused += 1
@@ -106,7 +105,7 @@ def _problem(sentence: str) -> str:
     """What is wrong with a refusal's words."""
     if not sentence.endswith("."):
         return "no full stop"
-    if "\n" in sentence or not sentence.isascii() and _unprintable(sentence):
+    if "\n" in sentence or (not sentence.isascii() and _unprintable(sentence)):
         return "more than a line of text"
     if len(sentence) > _LONGEST_SENTENCE:
         return f"{len(sentence)} characters"
@@ -152,8 +151,7 @@ def watched(name: str, seed: int, numbers: range) -> Outcome:
 
 def _child(name: str, seed: int, numbers: range, current: Any, sender: Any) -> None:
     with tempfile.TemporaryDirectory(prefix="rebt_ros_fuzz_") as directory:
-        target = targets(Path(directory))[name]
         outcome = Outcome(name, seed)
-        for number in each(target, outcome, numbers):
+        for number in each(target(name, Path(directory)), outcome, numbers):
             current.value = number
         sender.send(outcome)

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
-from typing import Any
+from typing import Any, Final
 from xml.etree import ElementTree
 
 from fuzz import corpus
 from fuzz.mutation import mutated_bytes, mutated_json, mutated_text
-
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.dot import render_dot
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
@@ -34,20 +33,14 @@ class Target:
     """Reads it; may raise nothing but a `RebtError`."""
 
 
-def targets(directory: Path) -> dict[str, Target]:
-    """All targets, by name.
+def target(name: str, directory: Path) -> Target:
+    """The target of that name.
 
     Args:
+        name: One of `NAMES`.
         directory: An empty one, for the files of the inputs.
     """
-    made = (
-        Target("documents", _document, _read_document),
-        _of_files("recordings", directory, _recordings(directory), "input.csv"),
-        _of_files("tables", directory, corpus.tables(), "input.csv"),
-        Target("experiments", _experiment, _read_experiment),
-        _bags(directory),
-    )
-    return {one.name: one for one in made}
+    return _MAKERS[name](directory)
 
 
 def _document(random: Random) -> str:
@@ -80,10 +73,6 @@ def _experiment(random: Random) -> str:
 
 def _read_experiment(text: str) -> None:
     as_behavior_tree(parse_config(text, "input").root)
-
-
-def _recordings(directory: Path) -> tuple[bytes, ...]:
-    return (corpus.recording(directory / "seeds"),)
 
 
 def _of_files(name: str, directory: Path, seeds: tuple[bytes, ...], file: str) -> Target:
@@ -122,3 +111,15 @@ def _bags(directory: Path) -> Target:
         load([one], InputOptions(skip_bad=True, sample_rate=10.0))
 
     return Target("bags", make, read)
+
+
+_MAKERS: Final[dict[str, Callable[[Path], Target]]] = {
+    "documents": lambda _: Target("documents", _document, _read_document),
+    "recordings": lambda directory: _of_files(
+        "recordings", directory, (corpus.recording(directory / "seeds"),), "input.csv"
+    ),
+    "tables": lambda directory: _of_files("tables", directory, corpus.tables(), "input.csv"),
+    "experiments": lambda _: Target("experiments", _experiment, _read_experiment),
+    "bags": _bags,
+}
+NAMES: Final = tuple(_MAKERS)
