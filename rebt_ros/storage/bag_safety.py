@@ -47,8 +47,8 @@ _LZ4: Final = 0x184D2204
 _LZ4_RATIO: Final = 255
 
 #: SQLite instructions that are granted per byte of a file, and to any file.
-_STEPS_PER_BYTE: Final = 100
-_STEPS: Final = 10_000_000
+_STEPS_PER_BYTE: Final = 20
+_STEPS: Final = 1_000_000
 _STEPS_AT_ONCE: Final = 10_000
 
 

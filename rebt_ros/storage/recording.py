@@ -203,7 +203,7 @@ def recordings(directory: Path) -> tuple[Path, ...]:
         InputError: There is no such directory, or there is no recording in it.
     """
     try:
-        files = sorted(one for one in directory.iterdir() if one.suffix == ".csv")
+        files = sorted(one for one in directory.glob("*.csv") if one.is_file())
     except NotADirectoryError as err:
         raise InputError(f"{directory} is not a directory: name one with recordings.") from err
     except OSError as err:

@@ -20,7 +20,7 @@ from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import HasCategory, Interval, IsTrue, LastActionIs, Literal
 from rebt_ros.storage.recording import RecordingWriter
 
-_ACTION, _STATE = "std_msgs/msg/String", "std_msgs/msg/Float64MultiArray"
+ACTION, STATE = "std_msgs/msg/String", "std_msgs/msg/Float64MultiArray"
 
 
 def _everything() -> LearnedTree:
@@ -119,19 +119,19 @@ def experiments() -> tuple[str, ...]:
 def bag(path: Path, storage: StoragePlugin, compression: CompressionMode | None) -> Path:
     """Writes a bag of 40 messages."""
     types = get_typestore(Stores.ROS2_JAZZY)
-    with_layout = types.types[_STATE], types.types["std_msgs/msg/MultiArrayLayout"]
+    with_layout = types.types[STATE], types.types["std_msgs/msg/MultiArrayLayout"]
     writer = Writer(path, version=9, storage_plugin=storage)
     if compression is not None:
         writer.set_compression(compression, CompressionFormat.ZSTD)
     with writer:
-        state = writer.add_connection("/state", _STATE, typestore=types)
-        action = writer.add_connection("/action", _ACTION, typestore=types)
+        state = writer.add_connection("/state", STATE, typestore=types)
+        action = writer.add_connection("/action", ACTION, typestore=types)
         for count in range(20):
             values = np.array([count / 3, -count, 1e9])
             message = with_layout[0](layout=with_layout[1](dim=[], data_offset=0), data=values)
-            writer.write(state, 2 * count, types.serialize_cdr(message, _STATE))
-            label = types.types[_ACTION](data=("go", "turn", "wait")[count % 3])
-            writer.write(action, 2 * count + 1, types.serialize_cdr(label, _ACTION))
+            writer.write(state, 2 * count, types.serialize_cdr(message, STATE))
+            label = types.types[ACTION](data=("go", "turn", "wait")[count % 3])
+            writer.write(action, 2 * count + 1, types.serialize_cdr(label, ACTION))
     return path
 
 
