@@ -60,7 +60,7 @@ def _read_document(text: str) -> None:
     for value in (0.0, 1.0):
         runtime.tick([value] * len(learned.features))
     runtime.halt()
-    render_text(learned).encode()
+    assert all(line.isprintable() for line in render_text(learned).split("\n"))
     render_dot(learned).encode()
     picture = ElementTree.fromstring(render_svg(learned))
     assert not [one.tag for one in picture.iter() if one.tag.endswith(("script", "foreignObject"))]
