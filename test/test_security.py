@@ -115,17 +115,13 @@ def test_what_a_tree_calls_its_parts_is_no_path(name: str, tmp_path: Path) -> No
 @pytest.mark.parametrize("name", [one for one in TEXTS if one != "\ud800"], ids=ascii)
 def test_what_topics_and_values_are_called_is_no_path(name: str, tmp_path: Path) -> None:
     features = (Feature(name, topic=name, index=0),)
+    label = name if name and name.isprintable() else "go"
     with RecordingWriter(tmp_path / "out", features, (name,)) as writer:
-        if not name.isprintable() or not name:
-            name = "go"
-        writer.write(Row(1, next(iter(writer._channels)), name, None, (0.5,)))
+        writer.write(Row(1, name, label, None, (0.5,)))
     (written,) = _inside(tmp_path)
     assert (tmp_path / written).parent == tmp_path / "out"
-    try:
+    if not set("\r\n") & set(name):
         assert len(read_recording(tmp_path / written).demonstration) == 1
-    except RebtError as err:
-        # A line break within a name is not read back.
-        assert "line 2" in str(err) or "line 3" in str(err)
 
 
 @pytest.mark.parametrize("name", ["a\0b", "x" * 5000, "/proc/self/mem", "\ud800"])
