@@ -80,18 +80,29 @@ def documents() -> tuple[str, ...]:
     return tuple(map(dumps, (_everything(), simple(), _two_channels())))
 
 
-@cache
-def recording(directory: Path) -> bytes:
-    """A recording; the directory is needed to write one."""
+def recordings(directory: Path) -> tuple[bytes, ...]:
+    """Recordings as they are written, and as version 1 was; a directory is needed to write one."""
     features = (Feature("x", topic="state", index=0), Feature("a,b", topic="state", index=1))
     random = Random(0)
+    head = {
+        "version": 1,
+        "sample_rate": None,
+        "features": [
+            {"name": one.name, "topic": one.topic, "index": one.index} for one in features
+        ],
+        "channels": ["action", "/arm"],
+    }
+    text = f'# rebt_ros recording {json.dumps(head)}\nstamp,channel,action,last_action,x,"a,b"\n'
     with RecordingWriter(directory, features, ("action", "/arm")) as writer:
         for count in range(30):
             label = random.choice(("go", "turn", 'say "hi", twice', "größer"))
             channel = random.choice(("action", "/arm"))
             state = (random.random(), -(10.0 ** random.randint(-9, 9)))
-            writer.write(Row(1_700_000_000_000_000_000 + count, channel, label, None, state))
-    return writer.path.read_bytes()
+            stamp = 1_700_000_000_000_000_000 + count
+            writer.write(Row(stamp, channel, label, None, state))
+            quoted = label.replace('"', '""')
+            text += f'{stamp},{channel},"{quoted}",,{state[0]!r},{state[1]!r}\n'
+    return writer.path.read_bytes(), text.encode()
 
 
 def tables() -> tuple[bytes, ...]:
