@@ -81,7 +81,14 @@ def test_a_file_that_unpacks_to_too_much_is_refused(
         read_bag(bag)
 
 
-def packed_chunks(path: Path, name: str, pack: Callable[[bytes], bytes], times: int = 1) -> Path:
+def packed_chunks(
+    path: Path,
+    name: str,
+    pack: Callable[[bytes], bytes],
+    *,
+    times: int = 1,
+    metadata: bytes = b"",
+) -> Path:
     """An mcap bag whose chunks are packed in a way of their own, and indexed several times."""
     types = corpus.get_typestore(corpus.Stores.ROS2_JAZZY)
     writer = Writer(path, version=9, storage_plugin=MCAP)
@@ -99,6 +106,7 @@ def packed_chunks(path: Path, name: str, pack: Callable[[bytes], bytes], times: 
             writer.write(connection, 1, types.serialize_cdr(made, kind))
         storage.close_chunk()
         storage.chunks *= times
+        storage.channels = [one._replace(metadata=metadata) for one in storage.channels]
     return path
 
 
@@ -298,4 +306,35 @@ def test_long_metadata_are_refused(tmp_path: Path) -> None:
     with (bag / METADATA).open("a") as metadata:
         metadata.write("#" * bag_safety.LARGEST_METADATA)
     with refused("the most that are read"):
+        read_bag(bag)
+
+
+NESTED = "[" * 1500
+
+
+def test_deeply_nested_metadata_are_refused(tmp_path: Path) -> None:
+    bag = corpus.bag(tmp_path / "bag", MCAP, None)
+    with (bag / METADATA).open("a") as metadata:
+        metadata.write(f"  more: {NESTED}\n")
+    with refused("deep nesting"):
+        read_bag(bag)
+
+
+def test_deeply_nested_qos_are_refused_in_a_database(tmp_path: Path) -> None:
+    bag = corpus.bag(tmp_path / "bag", SQLITE, None)
+    execute(bag, ("UPDATE topics SET offered_qos_profiles = ?", (NESTED,)))
+    with refused("too long or nested"):
+        read_bag(bag)
+
+
+def test_deeply_nested_qos_are_refused_in_an_mcap_file(tmp_path: Path) -> None:
+    texts = (b"offered_qos_profiles", NESTED.encode())
+    metadata = b"".join(struct.pack("<I", len(text)) + text for text in texts)
+    with refused("too long or nested"):
+        read_bag(packed_chunks(tmp_path / "bag", "zstd", zstd.compress, metadata=metadata))
+
+
+def test_a_file_whose_channels_stand_in_its_chunks_only_is_refused(tmp_path: Path) -> None:
+    bag = packed_chunks(tmp_path / "bag", "zstd", zstd.compress, times=0)
+    with refused("does not name all its chunks"):
         read_bag(bag)

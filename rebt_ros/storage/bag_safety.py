@@ -22,7 +22,11 @@ from typing import BinaryIO, Final
 from rebt_ros.errors import InputError
 
 #: Longest metadata.yaml that is read (bytes).
-LARGEST_METADATA: Final = 1_000_000
+LARGEST_METADATA: Final = 500_000
+#: Longest description of a topic's QoS, which is YAML as well (bytes).
+LARGEST_QOS: Final = 8_000
+#: Deepest nesting of brackets in either; the time that YAML takes grows with its square.
+DEEPEST_YAML: Final = 20
 
 #: What compressed data may unpack to: this much in any case, and this many times their own size.
 LARGEST_EXPANSION: Final = 64 << 20
@@ -35,6 +39,8 @@ _URL_CHARACTERS: Final = frozenset("%?#")
 
 _MCAP: Final = b"\x89MCAP0\r\n"
 _MCAP_FOOTER: Final = 37
+_SCHEMA: Final = 0x03
+_CHANNEL: Final = 0x04
 _CHUNK: Final = 0x06
 _CHUNK_INDEX: Final = 0x08
 _FOOTER: Final = 0x02
@@ -61,6 +67,7 @@ def check_bag(path: Path, metadata: str) -> None:
 
     Raises:
         InputError: The bag is refused.
+        ValueError: So it is, and the message tells only why.
         OSError: It cannot be read.
     """
     if not path.is_dir():
@@ -142,6 +149,24 @@ def _check_schema(connection: object) -> None:
             columns = execute("SELECT hidden FROM pragma_table_xinfo(?)", (name,)).fetchall()
             if any(hidden for (hidden,) in columns):
                 raise ValueError(f"its table {name!r} has computed columns")
+    columns = execute("SELECT name FROM pragma_table_info('topics')").fetchall()
+    if ("offered_qos_profiles",) in columns:
+        for (profiles,) in execute("SELECT offered_qos_profiles FROM topics"):
+            _check_qos(str(profiles).encode())
+
+
+def _check_qos(text: bytes) -> None:
+    if len(text) > LARGEST_QOS or _nests_deeply(text):
+        raise ValueError("the QoS of a topic is too long or nested")
+
+
+def _nests_deeply(text: bytes) -> bool:
+    depth = 0
+    for bracket in re.findall(rb"[\[\]{}]", text):
+        depth += 1 if bracket in b"[{" else -1
+        if depth > DEEPEST_YAML:
+            return True
+    return False
 
 
 def _check_metadata(file: Path, directory: Path) -> None:
@@ -151,9 +176,10 @@ def _check_metadata(file: Path, directory: Path) -> None:
             f"{file} has more than {LARGEST_METADATA} bytes, the most that are read: "
             f"run `ros2 bag reindex {directory}` to write it anew."
         )
-    if _ALIAS.search(file.read_bytes()):
+    text = file.read_bytes()
+    if _ALIAS.search(text) or _nests_deeply(text):
         raise InputError(
-            f"{file} has YAML anchors or aliases, which no recorder writes: "
+            f"{file} has YAML anchors, aliases or deep nesting, which no recorder writes: "
             f"run `ros2 bag reindex {directory}` to write it anew."
         )
 
@@ -165,7 +191,7 @@ def _check_file(file: Path, directory: Path) -> None:
         size = os.fstat(opened.fileno()).st_size
         opened.seek(0)
         if magic == _MCAP:
-            unpacked = _mcap_bound(file, opened, size)
+            unpacked = _mcap_bound(opened, size)
         elif int.from_bytes(magic[:4], "little") == _ZSTD:
             if Path(file.stem).suffix == ".mcap":
                 raise InputError(
@@ -238,11 +264,11 @@ def _lz4_bound(file: BinaryIO) -> int:
     return total
 
 
-def _mcap_bound(path: Path, file: BinaryIO, size: int) -> int:
+def _mcap_bound(file: BinaryIO, size: int) -> int:
     """The most that the chunks of an mcap file can unpack to.
 
     Raises:
-        InputError: Its index names a chunk twice, or one that is not there.
+        ValueError: Its index names a chunk twice, one that is not there, or not all.
     """
     total = 0
     if size < len(_MCAP) + _MCAP_FOOTER:
@@ -260,19 +286,34 @@ def _mcap_bound(path: Path, file: BinaryIO, size: int) -> int:
                     total += _zstd_bound(file, file.tell() + length)
                 else:
                     total += _lz4_bound(file) if compression == b"lz4" else length
+            elif kind == _CHANNEL:
+                _check_channel(file, start)
+    described = False
     with contextlib.suppress(struct.error, OverflowError):
         for kind, start in _records(file, summary or size, size):
+            described = described or kind == _SCHEMA
             if kind == _CHUNK_INDEX:
                 file.seek(start + 16)
                 (place,) = struct.unpack("<Q", file.read(8))
                 file.seek(start + 32)
                 file.seek(struct.unpack("<I", file.read(4))[0] + 8, os.SEEK_CUR)
                 if chunks.pop(place, None) != _packed(file):
-                    raise InputError(
-                        f"{path} is truncated or damaged (its index does not fit its chunks): "
-                        f"try `ros2 bag reindex {path.parent}`, or record it again."
-                    )
+                    raise ValueError("its index does not fit its chunks")
+            elif kind == _CHANNEL:
+                _check_channel(file, start)
+    if chunks or (total and not described):
+        # rosbags would unpack all chunks to find the channels in them.
+        raise ValueError("its index does not name all its chunks")
     return total
+
+
+def _check_channel(file: BinaryIO, start: int) -> None:
+    """Refuses a channel with descriptions that take long to read."""
+    file.seek(start + 4)
+    for _ in range(2):
+        file.seek(struct.unpack("<I", file.read(4))[0], os.SEEK_CUR)
+    (length,) = struct.unpack("<I", file.read(4))
+    _check_qos(file.read(min(length, LARGEST_QOS + 1)))
 
 
 def _packed(file: BinaryIO) -> tuple[bytes, int]:
