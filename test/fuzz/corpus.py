@@ -53,10 +53,10 @@ def _everything() -> LearnedTree:
     return LearnedTree(features, some.ACTIONS, tree, some.PROVENANCE, (psa, loop))
 
 
-def simple() -> LearnedTree:
+def simple(label: str = "go") -> LearnedTree:
     """What the executor of a campaign runs: go where the first value of the state is small."""
     features = (Feature("x", topic="state", index=0),)
-    rule = some.when(some.at_most("x", 0.5), then=some.action("go"))
+    rule = some.when(some.at_most("x", 0.5), then=some.action(label))
     tree = nodes.Selector((rule, some.action("turn")))
     return LearnedTree(features, nodes.actions(tree), tree, some.PROVENANCE)
 

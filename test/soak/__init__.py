@@ -1,4 +1,4 @@
-"""The soak: recorder, learner, executor and a robot as real processes, under load and random faults.
+"""The soak: recorder, learner, executor and a robot, as real processes under load and faults.
 
 robot
     A process that publishes states and a demonstrator's actions, and hears the commands.

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from soak.ledger import Ledger
-from soak.robot import action_in, state_of, values_from
-
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.errors import RebtError
 from rebt_ros.storage.recording import read_recording
+from soak.ledger import Ledger
+from soak.robot import action_in, state_of, values_from
 
 
 def audit(directory: Path, ledger: Ledger, blocks: int) -> None:
