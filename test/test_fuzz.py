@@ -51,13 +51,19 @@ def _raise(error: Exception) -> None:
     raise error
 
 
+def _busy(seconds: float) -> None:
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
 @pytest.mark.parametrize(
     "read",
     [
         lambda _: 1 / 0,
         lambda _: _raise(MemoryError()),
         lambda _: _raise(InputError("no full stop")),
-        lambda _: time.sleep(0.03),
+        lambda _: _busy(0.03),
     ],
     ids=["a crash", "no memory", "no sentence", "a hang"],
 )

@@ -63,11 +63,12 @@ class Fleet:
 
     def kill(self, name: str) -> None:
         """SIGKILL."""
-        self._judge(name, self._lives[name].process.stop(signal.SIGKILL), -signal.SIGKILL)
+        process = self._lives.pop(name).process
+        self._judge(name, process, process.stop(signal.SIGKILL), -signal.SIGKILL)
 
     def stop(self, name: str, number: signal.Signals) -> None:
         """Stops a node in order, which must end well."""
-        process = self._lives[name].process
+        process = self._lives.pop(name).process
         process.process.send_signal(number)
         began = time.monotonic()
         try:
@@ -77,14 +78,14 @@ class Fleet:
             process.process.kill()
             code = 0 * process.process.wait()
         self.ledger.raise_to("longest_stop_s", time.monotonic() - began)
-        self._judge(name, code, 0)
+        self._judge(name, process, code, 0)
 
     def watch(self) -> None:
         """Looks after the memory of all nodes, and for any that ended by itself."""
         now = time.monotonic()
         for name, life in self._lives.items():
             if life.process.process.poll() is not None:
-                self._judge(name, life.process.process.returncode, 0)
+                self._judge(name, life.process, life.process.process.returncode, 0)
                 self.ledger.lose("nodes ended by themselves", name)
                 self.start(name)
                 return
@@ -111,8 +112,15 @@ class Fleet:
             self.ledger.lose("processes left", f"{pid}: {command}")
             os.kill(pid, signal.SIGKILL)
 
-    def _judge(self, name: str, code: int, expected: int) -> None:
-        said = self._lives[name].process.stderr
+    def kill_all(self) -> None:
+        """Leaves nothing behind, however the soak has ended."""
+        for life in self._lives.values():
+            if life.process.process.poll() is None:
+                life.process.process.kill()
+                life.process.process.wait()
+
+    def _judge(self, name: str, process: NodeProcess, code: int, expected: int) -> None:
+        said = process.stderr
         if code != expected:
             self.ledger.lose("exit codes", f"{name} ended with {code}: {said[-1000:]}")
         if "Traceback" in said or "FATAL" in said:

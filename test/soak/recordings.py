@@ -53,6 +53,9 @@ def _audit_rows(
         if block is None or tuple(state) != values_from(state[0]):
             ledger.lose("mixed rows", f"{where} has values of several states")
             continue
+        if block == before:
+            ledger.lose("late states", f"{where} has the state of the row before")
+            continue
         if demonstration.actions[code] != action_in(state):
             ledger.lose("mixed rows", f"{where} has the action of another state")
         if block in seen:

@@ -9,6 +9,7 @@ It reads lines from standard input: ``pause``, ``resume``; it ends when that is 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import sys
 import threading
@@ -18,7 +19,7 @@ from pathlib import Path
 from typing import Final
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64MultiArray, String
@@ -87,6 +88,11 @@ def _run(robot: Robot, rate: float, ended: threading.Event) -> None:
         time.sleep(max(0.0, following - time.monotonic()))
 
 
+def _spin(executor: SingleThreadedExecutor) -> None:
+    with contextlib.suppress(ExternalShutdownException):
+        executor.spin()
+
+
 def main() -> None:
     """Arguments: the log of commands, states per second."""
     log, rate = Path(sys.argv[1]), float(sys.argv[2])
@@ -97,7 +103,7 @@ def main() -> None:
     ended = threading.Event()
     threads = [
         threading.Thread(target=_run, args=(robot, rate, ended)),
-        threading.Thread(target=executor.spin, daemon=True),
+        threading.Thread(target=_spin, args=(executor,)),
     ]
     for thread in threads:
         thread.start()
@@ -112,8 +118,8 @@ def main() -> None:
     # What was sent arrives.
     time.sleep(0.5)
     print(json.dumps({"states": robot.states, "actions": robot.actions}), flush=True)
-    executor.shutdown()
     rclpy.try_shutdown()
+    threads[1].join()
 
 
 if __name__ == "__main__":
