@@ -32,6 +32,7 @@ setup(
         "pyeda>=0.29",
         "rosbags>=0.11",
         "scikit-learn>=1.4",
+        "scipy>=1.11",
     ],
     extras_require={
         "pictures": ["matplotlib>=3.6"],
@@ -43,11 +44,14 @@ setup(
             f"demo = {PACKAGE}.commands.demo:main",
             f"demonstrator = {PACKAGE}.ros.demonstrator_node:main",
             f"executor = {PACKAGE}.ros.executor_node:main",
+            f"generate = {PACKAGE}.commands.generate:main",
             f"learn = {PACKAGE}.commands.learn:main",
             f"learner = {PACKAGE}.ros.learner_node:main",
             f"recorder = {PACKAGE}.ros.recorder_node:main",
             f"replay = {PACKAGE}.commands.replay:main",
             f"robot = {PACKAGE}.ros.robot_node:main",
+            f"simulate = {PACKAGE}.commands.simulate:main",
+            f"synthetic_robot = {PACKAGE}.ros.synthetic_robot_node:main",
         ],
     },
 )

@@ -35,6 +35,7 @@ LAYERS: Final = (
     {"evaluation", "pictures", "simulation", "storage"},
     {"algorithms"},
     {"decision_tree"},
+    {"edit_distance"},
     {"behavior_tree"},
     {"demonstration"},
     {"logic"},
@@ -68,7 +69,7 @@ HOMES: Final = {
     "jsonschema": (),
     "joblib": ("rebt_ros.commands.bench_*",),
     "matplotlib": ("rebt_ros.pictures.*",),
-    "networkx": ("rebt_ros.algorithms.lat_*",),
+    "networkx": ("rebt_ros.algorithms.lat_*", "rebt_ros.edit_distance.networkx_worker"),
     "py_trees": (
         "rebt_ros.behavior_tree.runtime",
         "rebt_ros.ros",
@@ -77,7 +78,7 @@ HOMES: Final = {
     ),
     "pyeda": ("rebt_ros.logic.minimize",),
     "rosbags": ("rebt_ros.storage", "rebt_ros.storage.*"),
-    "scipy": (),
+    "scipy": ("rebt_ros.edit_distance.program", "rebt_ros.edit_distance.relaxation"),
     "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
 }
 
@@ -258,7 +259,7 @@ def test_the_core_runs_where_ros_is_not_installed() -> None:
     _run(f"{WITHOUT_ROS} [importlib.import_module(name) for name in {names}]")
 
 
-@pytest.mark.parametrize("command", ["learn", "replay"])
+@pytest.mark.parametrize("command", ["generate", "learn", "replay", "simulate"])
 def test_offline_commands_need_no_ros(command: str) -> None:
     _run(f"{WITHOUT_ROS} importlib.import_module('rebt_ros.commands.{command}')")
 

@@ -227,6 +227,12 @@ def test_a_header_that_was_declared_absent_is_refused(table):
         read_csv(table("x,y,a\n1,2,go\n3,4,turn\n"), header=False)
 
 
+def test_how_the_actions_ended_is_no_feature_and_is_noted(table):
+    read = read_csv(table("x,action.outcome,y.outcome,action\n1,success,a,go\n2,failure,b,go\n"))
+    assert [feature.name for feature in read.demonstration.features] == ["x", "y.outcome"]
+    assert read.notes == ("column 'action.outcome' says how actions ended and is no feature",)
+
+
 def test_a_stamp_column_of_integers_is_the_stamp(table):
     shown = read_csv(table("stamp,x,a\n1700000000000000001,1,go\n1700000000000000002,2,go\n"))
     assert [one.name for one in shown.demonstration.features] == ["x"]

@@ -135,6 +135,14 @@ def test_a_tree_may_be_as_deep_as_the_limit() -> None:
             "it: child 1 of the root has the unknown field 'colour'.",
         ),
         (
+            group("sequence", action("a\x1b[2J")),
+            "it: child 1 of the root has the name 'a\\x1b[2J': write it with printable characters.",
+        ),
+        (
+            group("sequence", condition(" ")),
+            "it: child 1 of the root has the target_state ' ': write it with printable characters.",
+        ),
+        (
             group("sequence", action("a", p_success=1.5)),
             "it: child 1 of the root has p_success 1.5, which must be from 0 to 1.",
         ),

@@ -24,7 +24,12 @@ from rebt_ros.simulation.experiment_config import (
     SimulatedNode,
     parse_config,
 )
-from rebt_ros.simulation.experiment_robot import ExperimentBody, ExperimentRobot, simulate
+from rebt_ros.simulation.experiment_robot import (
+    TICK_PERIOD,
+    ExperimentBody,
+    ExperimentRobot,
+    simulate,
+)
 from rebt_ros.simulation.py_trees_form import py_trees_form
 from rebt_ros.simulation.ticking import Outcome, ticker
 
@@ -208,10 +213,9 @@ def test_an_action_is_logged_in_the_tick_and_environment_in_which_it_is_done() -
     for _ in range(2000):
         robot.step()
         environment.append(robot.state)
-    assert shown.states.tolist() == [list(environment[stamp]) for stamp in shown.stamps]
-    assert shown.stamps.tolist() == [
-        tick for tick, (value,) in enumerate(environment) if value < 0.5
-    ]
+    ticks = [tick for tick, (value,) in enumerate(environment) if value < 0.5]
+    assert shown.states.tolist() == [list(environment[tick]) for tick in ticks]
+    assert shown.stamps.tolist() == [(tick + 1) * TICK_PERIOD for tick in ticks]
     assert run.succeeded.all()
 
 
@@ -262,6 +266,19 @@ def test_progress_is_reported_as_a_share() -> None:
     shares: list[float] = []
     simulate(ExperimentRobot(config(A), 1), 2500, shares.append)
     assert shares == [0.0, 0.4, 0.8]
+
+
+def test_a_watcher_sees_every_tick_and_all_that_is_done() -> None:
+    seen: list[tuple[int, tuple[float, ...], int]] = []
+    run = simulate(
+        ExperimentRobot(config(X, A, B), 1),
+        200,
+        watch=lambda stamp, state, done: seen.append((stamp, state, len(done))),
+    )
+    assert [stamp for stamp, _, _ in seen] == [TICK_PERIOD * tick for tick in range(1, 201)]
+    done = [(stamp, list(state)) for stamp, state, count in seen for _ in range(count)]
+    shown = run.demonstration
+    assert done == list(zip(shown.stamps.tolist(), shown.states.tolist(), strict=True))
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,7 @@ DECLARED_AS: Final = {
     "py_trees": ("py_trees", "py_trees"),
     "pyeda": (None, "pyeda"),  # has no rosdep key
     "rosbags": ("python3-rosbags-pip", "rosbags"),
+    "scipy": ("python3-scipy", "scipy"),
     "sklearn": ("python3-sklearn", "scikit-learn"),
 }
 

@@ -49,10 +49,17 @@ def _parameters(node: str, directory: Path, arguments: list[str]) -> dict[str, A
     return dict(zip(names, map(parameter_value_to_python, got.values), strict=True))
 
 
-@pytest.mark.parametrize("node", ["recorder", "learner", "executor"])
+#: What a node cannot do without.
+_NEEDED = {"synthetic_robot": ["-p", "config:=tree.json"]}
+_TREE = '{"type_": "sequence", "child_list": [{"type_": "action", "name": "wave"}]}'
+
+
+@pytest.mark.parametrize("node", ["recorder", "learner", "executor", "synthetic_robot"])
 def test_a_parameter_file_lists_every_parameter_with_its_default(node: str, tmp_path: Path) -> None:
+    (tmp_path / "tree.json").write_text(_TREE)
     file = CHECKOUT / "config" / f"{node}.yaml"
-    defaults = _parameters(node, tmp_path, [])
-    assert _parameters(node, tmp_path, ["--params-file", str(file)]) == defaults
+    needed = _NEEDED.get(node, [])
+    defaults = _parameters(node, tmp_path, needed)
+    assert _parameters(node, tmp_path, ["--params-file", str(file), *needed]) == defaults
     listed = re.findall(r"^    (\w+):", file.read_text(), flags=re.MULTILINE)
     assert sorted(listed) == sorted(defaults)

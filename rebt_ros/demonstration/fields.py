@@ -31,3 +31,14 @@ def fields_of(dimension_labels: Sequence[str], count: int) -> tuple[str, ...]:
         return ()
     fields = tuple(name.strip() for name in names)
     return fields if len(fields) == count == len(set(fields)) and all(fields) else ()
+
+
+def dimension_labels_of(fields: Sequence[str]) -> tuple[str, ...]:
+    """Labels of the layout's dimensions from which `fields_of` reads these names.
+
+    >>> dimension_labels_of(["front", "left"])
+    ('front,left',)
+    >>> dimension_labels_of(["front, far", "left"])
+    ('front, far', 'left')
+    """
+    return tuple(fields) if any("," in field for field in fields) else (",".join(fields),)

@@ -246,6 +246,8 @@ class _Reader:
         text = value.get(field)
         if not isinstance(text, str) or not text:
             self._refuse(place, f"needs a text as {field}")
+        if not text.isprintable() or text != text.strip():
+            self._refuse(place, f"has the {field} {text!r}: write it with printable characters")
         return text
 
     def _probability(self, value: dict[str, Any], place: str) -> float:

@@ -12,10 +12,10 @@ while others run, and a Repeater goes through its children three times.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from random import Random
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -31,6 +31,12 @@ TICKS = 20_000
 RUNNING_CHANCE = 0.4
 REPEATS = 3
 
+#: Simulated time from one tick to the next, in nanoseconds; the first tick is at this time.
+TICK_PERIOD = 100_000_000
+
+#: The only environment variable of a robot whose configuration has no conditions.
+UNREAD_VARIABLE = "/unread"
+
 _SUCCESS, _FAILURE, _RUNNING = Outcome.SUCCESS, Outcome.FAILURE, Outcome.RUNNING
 
 
@@ -39,6 +45,10 @@ class LoggedAction(NamedTuple):
 
     label: str
     succeeded: bool
+
+
+#: Gets the stamp of a tick (nanoseconds), the environment's values, and the actions that are done.
+Watch: TypeAlias = Callable[[int, tuple[float, ...], Sequence[LoggedAction]], None]
 
 
 class ExperimentBody:
@@ -142,13 +152,18 @@ class ExperimentRobot:
         return self._body.log
 
 
+def published_variables(config: ExperimentConfig) -> tuple[str, ...]:
+    """The variables of a robot that others learn from: a state needs at least one."""
+    return config.variables or (UNREAD_VARIABLE,)
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class SimulatedRun:
     """What a simulation logged."""
 
     demonstration: Demonstration
     """One row per action that was done; its features are the environment variables, and its stamp
-    is the number of the tick."""
+    is the simulated time of the tick."""
     succeeded: BoolArray
     """Whether each row's action returned success, shape (rows,)."""
     ticks: int
@@ -158,6 +173,7 @@ def simulate(
     robot: ExperimentRobot,
     ticks: int = TICKS,
     progress: Callable[[float], None] | None = None,
+    watch: Watch | None = None,
 ) -> SimulatedRun:
     """Lets a robot act for a number of ticks.
 
@@ -167,6 +183,7 @@ def simulate(
         robot: Fresh, or from where it stands.
         ticks: At least 1.
         progress: Called now and then with the share that is done.
+        watch: Called at every tick, also where no action is done.
 
     Raises:
         OptionError: No ticks.
@@ -179,11 +196,14 @@ def simulate(
         done = robot.step()
         if done:
             state = robot.state
+            stamp = (tick + 1) * TICK_PERIOD
             for label, success in done:
-                stamps.append(tick)
+                stamps.append(stamp)
                 chosen.append(code[label])
                 succeeded.append(success)
                 values.extend(state)
+        if watch is not None:
+            watch((tick + 1) * TICK_PERIOD, robot.state, done)
         if progress is not None and tick % 1000 == 0:
             progress(tick / ticks)
     rows = len(stamps)

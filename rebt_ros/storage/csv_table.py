@@ -31,6 +31,10 @@ from rebt_ros.storage.text import read_text
 #: A column of this name holds each row's stamp, in nanoseconds, and is not a feature.
 STAMP = "stamp"
 
+#: A column of the label column's name and this says how each action ended: "success" or "failure".
+#: It is no feature, because it is known only afterwards.
+OUTCOME_SUFFIX = ".outcome"
+
 #: How many column names a message lists.
 _LISTED = 8
 
@@ -49,7 +53,8 @@ def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> 
         The rows that have an action: on the channel `DEFAULT_CHANNEL` where there is one label
         column; where there are several, each is a channel of its own, named after the column, and
         a row of the table is one row on each channel that has an action there.  Stamps are those
-        of the column `stamp` if it holds integers, else each row's position in the file.
+        of the column `stamp` if it holds integers, else each row's position in the file.  Columns
+        that say how the actions ended (`OUTCOME_SUFFIX`) are left out.
 
     Raises:
         InputError: The file cannot be read or is not such a table.
@@ -67,10 +72,13 @@ def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> 
     cells = tuple(zip(*(table.rows[row] for row in labelled), strict=True))
     shown = _Shown(table, labelled, cells)
     stamps = shown.stamps(notes)
+    left_out = _outcomes(table, notes)
+    if stamps is not None:
+        left_out.add(STAMP)
     read = [
         shown.feature(index, notes)
-        for index in range(len(table.columns))
-        if index not in table.labels and (stamps is None or table.columns[index] != STAMP)
+        for index, name in enumerate(table.columns)
+        if index not in table.labels and name not in left_out
     ]
     if not read:
         raise InputError(
@@ -313,6 +321,14 @@ def _labelled(table: _Table, notes: list[str]) -> list[int]:
         for row, cells in enumerate(table.rows)
         if any(cells[label].strip() for label in table.labels)
     ]
+
+
+def _outcomes(table: _Table, notes: list[str]) -> set[str]:
+    """The columns that say how the actions ended."""
+    wanted = {table.columns[label] + OUTCOME_SUFFIX for label in table.labels}
+    found = sorted(wanted & set(table.columns)) if table.header else []
+    notes += [f"column {name!r} says how actions ended and is no feature" for name in found]
+    return set(found)
 
 
 def _check_names(path: Path, columns: Sequence[str]) -> None:

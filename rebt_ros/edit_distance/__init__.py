@@ -1,0 +1,1 @@
+"""How far two behavior trees are apart: graph edit distance (paper, IV-B)."""
