@@ -190,6 +190,7 @@ class Soak:
         except RebtError as err:
             self.ledger.lose("last good tree", f"after a relearn: {err}")
             return
+        self.ledger.figures["trees_learned"] = self.ledger.figures.get("trees_learned", 0) + 1
         self._tree = path.read_text(encoding="utf-8")
         self.documents[0] = self._tree
         self._expect_tree()
