@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench-reduction fuzz soak lint format clean
+.PHONY: help setup build demo test bench-reduction experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -48,6 +48,9 @@ test: build ## Run the tests on the built package.
 bench-reduction: setup ## Compare the sizes of BT-Espresso's trees and ours (ARGS="..." for options).
 	@$(VENV_PYTHON) -m rebt_ros.commands.bench_reduction ../shared/experiments $(ARGS)
 
+experiment: setup ## Reproduce the paper's experiments on ../shared/experiments (ARGS="..." for options).
+	@$(VENV_PYTHON) -m rebt_ros.commands.experiment ../shared/experiments $(ARGS)
+
 # Sizes are multiplied by SCALE; a SEED makes the same inputs again.
 fuzz: SCALE ?= 1
 fuzz: SEED ?=
@@ -75,5 +78,5 @@ format: setup ## Format the code and sort its imports.
 	@$(VENV_PYTHON) -m ruff format $(SOURCES)
 
 clean: ## Remove what was built (not .venv).
-	rm -rf build install log demo-results bench-results .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf build install log demo-results bench-results experiment-results .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find rebt_ros test -name __pycache__ -prune -exec rm -rf {} +

@@ -35,7 +35,7 @@ DECLARED_AS: Final = {
 }
 
 #: Imported only where they are installed.
-OPTIONAL: Final = {"apsw", "imblearn", "matplotlib"}
+OPTIONAL: Final = {"apsw", "distributed", "imblearn", "matplotlib"}
 
 needs_installation = pytest.mark.skipif(
     INSTALLED == CHECKOUT / PACKAGE, reason="run from the checkout, not by 'make test'"
@@ -147,6 +147,15 @@ def test_ros2_run_finds_an_executable_for_every_entry_point() -> None:
 def test_every_entry_point_can_be_loaded() -> None:
     for entry_point in metadata.distribution(PACKAGE).entry_points.select(group="console_scripts"):
         assert callable(entry_point.load()), entry_point
+
+
+@needs_installation
+def test_every_node_begins_where_signals_are_heard_at_once() -> None:
+    scripts = metadata.distribution(PACKAGE).entry_points.select(group="console_scripts")
+    nodes = {one.name for one in scripts if one.value.startswith(f"{PACKAGE}.ros.")}
+    modules = (path.stem.removesuffix("_node") for path in SOURCES if path.stem.endswith("_node"))
+    assert nodes == set(modules)
+    assert {one.module for one in scripts if one.name in nodes} == {f"{PACKAGE}.ros.entry"}
 
 
 @needs_installation
