@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench-reduction fuzz soak lint format clean
+.PHONY: help setup build demo test bench-reduction bench-recorder fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -62,6 +62,10 @@ soak: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 soak: setup ## Run the nodes under load and random faults; nothing may get lost (MINUTES=10, SEED=7, ARGS=--verbose).
 	@PYTHONPATH=test:. $(VENV_PYTHON) -m soak --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) \
 	    --output bench-results/soak.json $(ARGS)
+
+bench-recorder: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+bench-recorder: setup ## Kill, load and measure the recorder (KILLS=50; ARGS="..." for options).
+	@PYTHONPATH=.:test:$$PYTHONPATH $(VENV_PYTHON) test/benchmarks/recorder.py --kills $(or $(KILLS),50) $(ARGS)
 
 lint: setup ## Check style, formatting and types.
 	@status=0; \

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from ros_processes import LATCHED, NodeProcess, Peer, own_domain, values_of
+from ros_processes import LATCHED, NodeProcess, Peer, values_of
 from std_msgs.msg import String
 
 from rebt_ros.behavior_tree.document import dumps
@@ -32,18 +31,6 @@ from rebt_ros.logic.conditions import LastActionIs, Literal, Threshold
 from rebt_ros.storage.tree_file import write_tree
 
 GO, TURN, STOP = (Action(label, "action") for label in ("go", "turn", "stop"))
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    with own_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def peer(domain: int) -> Iterator[Peer]:
-    with Peer(domain) as one:
-        yield one
 
 
 def _learned(tree: Node, topic: str | None = "state") -> LearnedTree:

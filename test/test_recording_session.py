@@ -20,6 +20,7 @@ class Disk:
     def __init__(self) -> None:
         self.files: list[File] = []
         self.full = False
+        self.syncs = 0
 
     def open(self, features: tuple[Feature, ...]) -> File:
         self.check()
@@ -46,6 +47,10 @@ class File:
     def write(self, row: Row) -> None:
         self._disk.check()
         self.written.append(row)
+
+    def sync(self) -> None:
+        self._disk.check()
+        self._disk.syncs += 1
 
     def close(self) -> None:
         self.end = "closed"
@@ -118,6 +123,24 @@ def test_a_full_disk_ends_a_demonstration_and_room_begins_another() -> None:
     ]
     assert (desk.session.rows, desk.session.lost) == (3, 2)
     assert desk.faults == ["write error"] * 2
+
+
+def test_a_disk_that_does_not_keep_its_rows_ends_a_demonstration() -> None:
+    desk = Desk()
+    desk.session.sync(0)
+    desk.session.start(0)
+    desk.session.observe(1, "state", [1.0], [])
+    desk.session.sync(1)
+    desk.session.act(2, "action", "go")
+    desk.session.sync(3)
+    assert (desk.disk.syncs, desk.session.failure) == (1, "")
+    desk.disk.full = True
+    desk.session.sync(4)
+    assert desk.session.failure == "the disk is full."
+    desk.disk.full = False
+    desk.session.act(5, "action", "turn")
+    assert desk.session.failure == ""
+    assert desk.rows() == [[("go", None, (1.0,))], [("turn", None, (1.0,))]]
 
 
 def test_a_new_length_is_accepted_by_a_new_demonstration_only() -> None:

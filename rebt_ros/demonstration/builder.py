@@ -155,7 +155,7 @@ class DemonstrationBuilder:
             raise BadMessageError(
                 Fault.UNKNOWN_TOPIC, f"{channel!r} is not one of the action topics."
             )
-        if any(not one.isprintable() for one in label):
+        if not label.isprintable():
             raise BadMessageError(
                 Fault.LABEL,
                 f"action topic {channel!r} sent the label {label!r}: "
@@ -239,6 +239,15 @@ def _features(fields: dict[str, tuple[str, ...]]) -> tuple[Feature, ...]:
         for topic in fields
         for index, name in enumerate(fields[topic])
     )
+
+
+def is_label(text: str) -> bool:
+    r"""Whether an action can have this label.
+
+    >>> is_label("turn left"), is_label(""), is_label("two\nlines")
+    (True, False, False)
+    """
+    return bool(text) and text.isprintable()
 
 
 def _base(topic: str) -> str:

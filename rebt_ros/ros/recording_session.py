@@ -35,6 +35,9 @@ class Writer(Protocol):
     def write(self, row: Row) -> None:
         """Adds a row that is durable afterwards."""
 
+    def sync(self) -> None:
+        """Makes its rows survive a loss of power."""
+
     def close(self) -> None:
         """Ends the file."""
 
@@ -182,6 +185,17 @@ class RecordingSession:
         return Answer(
             True, f"discarded {_count(rows)} in {writer.path}; a new demonstration has begun."
         )
+
+    def sync(self, stamp: int) -> None:
+        """Makes the rows written so far survive a loss of power."""
+        try:
+            if self._writer is not None:
+                self._writer.sync()
+        except RebtError as err:
+            # Whether the rows before are on the disk is not known: another file begins.
+            assert self._builder is not None
+            self._abandon(str(err))
+            self._begin(stamp)
 
     def _begin(self, stamp: int) -> None:
         """Starts a demonstration that knows the present state, but none of the actions before."""
