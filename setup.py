@@ -1,10 +1,41 @@
 """Builds and installs rebt_ros; called by colcon."""
 
+import shutil
+import subprocess
 from glob import glob
 
 from setuptools import find_packages, setup
+from setuptools.command.install_scripts import install_scripts
 
 PACKAGE = "rebt_ros"
+NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
+
+
+class InstallScripts(install_scripts):
+    """Starts the nodes with SIGINT and SIGTERM blocked; rebt_ros.ros.entry unblocks them.
+
+    Python needs a tenth of a second to come to the first line of a node.  A signal that comes in
+    that time waits, where env can make it so (GNU coreutils 8.31 and newer).
+    """
+
+    def write_script(self, script_name, contents, mode="t", *ignored):
+        """Writes an executable."""
+        interpreter, newline, rest = contents.partition("\n")
+        blocking = _env_that_blocks() if script_name in NODES else None
+        if blocking and interpreter.startswith("#!/"):
+            interpreter = f"#!{blocking} {interpreter[2:]}"
+        super().write_script(script_name, interpreter + newline + rest, mode, *ignored)
+
+
+def _env_that_blocks():
+    """What to put before an interpreter to start it with blocked signals, if that is possible."""
+    env = shutil.which("env")
+    if env is None:
+        return None
+    blocking = f"{env} -S --block-signal=INT,TERM"
+    done = subprocess.run([*blocking.split(), "true"], stderr=subprocess.DEVNULL, check=False)
+    return blocking if done.returncode == 0 else None
+
 
 setup(
     name=PACKAGE,
@@ -39,19 +70,15 @@ setup(
         "test": ["hypothesis", "jsonschema>=4.10", "pytest"],
         "upsampling": ["imbalanced-learn>=0.12"],
     },
+    cmdclass={"install_scripts": InstallScripts},
     entry_points={
         "console_scripts": [
             f"demo = {PACKAGE}.commands.demo:main",
-            f"demonstrator = {PACKAGE}.ros.demonstrator_node:main",
-            f"executor = {PACKAGE}.ros.executor_node:main",
             f"generate = {PACKAGE}.commands.generate:main",
             f"learn = {PACKAGE}.commands.learn:main",
-            f"learner = {PACKAGE}.ros.learner_node:main",
-            f"recorder = {PACKAGE}.ros.recorder_node:main",
             f"replay = {PACKAGE}.commands.replay:main",
-            f"robot = {PACKAGE}.ros.robot_node:main",
             f"simulate = {PACKAGE}.commands.simulate:main",
-            f"synthetic_robot = {PACKAGE}.ros.synthetic_robot_node:main",
+            *(f"{node} = {PACKAGE}.ros.entry:{node}" for node in NODES),
         ],
     },
 )

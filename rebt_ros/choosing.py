@@ -6,6 +6,7 @@ demonstrator did, on rows that it was not learned from, when LAT is what it chos
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from rebt_ros.algorithms.priority_root import reduced_tree
@@ -15,10 +16,14 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.options import LearnOptions, Use
-from rebt_ros.selection import CrossValidation, JudgedLevels
+from rebt_ros.selection import MOST_FOLDS, CrossValidation, JudgedLevels
 
 #: With fewer rows the folds are too small to tell levels apart.
 _FEWEST_ROWS = 50
+
+#: Steps of two cross-validations, of running the trees of one, and of running them with PSA nodes
+#: and without.
+_MOST_STEPS = 2 * (MOST_FOLDS + 1) + MOST_FOLDS + 2 * MOST_FOLDS
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -35,11 +40,33 @@ class Policy:
     """A sentence for each choice."""
 
 
-def choose(table: DemonstrationTable, options: LearnOptions) -> Policy:
-    """Chooses a policy by the rows of `table` alone."""
+class _Steps:
+    """Counts steps of the work and tells which share of it is behind at most."""
+
+    def __init__(self, advance: Callable[[float], None]) -> None:
+        self._advance = advance
+        self._taken = 0
+
+    def __call__(self) -> None:
+        self._taken += 1
+        self._advance(self._taken / _MOST_STEPS)
+
+
+def choose(
+    table: DemonstrationTable,
+    options: LearnOptions,
+    advance: Callable[[float], None] = lambda share: None,
+) -> Policy:
+    """Chooses a policy.
+
+    Args:
+        table: By its rows alone.
+        options: What is left to choose.
+        advance: Told which share of the work is behind; there may be less of it.
+    """
     if len(table) < _FEWEST_ROWS:
         return _unjudged(table, options)
-    judged, level, reasons = _last_action_and_level(table, options)
+    judged, level, reasons = _last_action_and_level(table, options, _Steps(advance))
     ccp_alpha = options.ccp_alpha
     if ccp_alpha is None:
         ccp_alpha = float(level.ccp_alphas[level.chosen])
@@ -84,7 +111,7 @@ def _unjudged(table: DemonstrationTable, options: LearnOptions) -> Policy:
 
 
 def _last_action_and_level(
-    table: DemonstrationTable, options: LearnOptions
+    table: DemonstrationTable, options: LearnOptions, step: Callable[[], None]
 ) -> tuple[CrossValidation, JudgedLevels, list[str]]:
     def cross_validation(last_action: bool) -> CrossValidation:
         return CrossValidation(
@@ -93,6 +120,7 @@ def _last_action_and_level(
             max_depth=options.max_depth,
             random_state=options.random_state,
             upsample=options.upsample,
+            step=step,
         )
 
     def run(judged: CrossValidation) -> JudgedLevels:

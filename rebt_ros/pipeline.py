@@ -48,6 +48,9 @@ _UNEVEN = (
     "back: record with a sample rate to use lags"
 )
 
+#: Where of all the work choosing and judging begin.
+_CHOOSING, _JUDGING = 0.1, 0.8
+
 #: Told what is being done and which share of the work is behind.
 Progress = Callable[[str, float], None]
 
@@ -181,9 +184,13 @@ def learn_from(
     table = with_lags(table, options.lags)
     held_out = table.held_out(options.test_fraction)
     shown = table.where(~held_out)
-    progress("choosing", 0.1)
-    policy = choose(shown, options)
-    progress("judging", 0.8)
+    progress("choosing", _CHOOSING)
+    policy = choose(
+        shown,
+        options,
+        lambda share: progress("choosing", _CHOOSING + (_JUDGING - _CHOOSING) * share),
+    )
+    progress("judging", _JUDGING)
     trained = policy.fitted.at(policy.ccp_alpha)
     tree = convert(trained, options, psa=policy.psa)
     figures = figures_of(table, held_out, trained, tree)

@@ -19,7 +19,7 @@ from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.table import DemonstrationTable
 
-_FOLDS = 5
+MOST_FOLDS = 5
 #: A LAT-augmented tree has to be converted and run through the rows to be judged: so many levels
 #: are, and no larger trees than that, which nobody could read anyway.
 _MOST_LEVELS_RUN, _MOST_LEAVES_RUN = 12, 32
@@ -78,6 +78,7 @@ class CrossValidation:
         max_depth: Splits on the longest path; None for no limit.
         random_state: Decides between equally good splits, and which rows are made up.
         upsample: Rows to fit the trees to beside those of the table; none is judged on them.
+        step: Called after each tree that was fitted, and each fold in which trees were run.
     """
 
     def __init__(
@@ -88,16 +89,20 @@ class CrossValidation:
         max_depth: int | None,
         random_state: int,
         upsample: Upsampling = Upsampling.NONE,
+        step: Callable[[], None] = lambda: None,
     ) -> None:
         def fitted(rows: DemonstrationTable) -> FittedTree:
-            return fit(
+            tree = fit(
                 rows,
                 last_action=last_action,
                 max_depth=max_depth,
                 random_state=random_state,
                 upsample=upsample,
             )
+            step()
+            return tree
 
+        self._step = step
         fold = folds(table)
         self.fitted = fitted(table)
         self._folds = [
@@ -120,24 +125,23 @@ class CrossValidation:
         even = np.linspace(0, len(small) - 1, min(len(small), _MOST_LEVELS_RUN)).astype(int)
         run = small[np.unique(even)]
         scores = [
-            [
-                _agreement_run(convert(of_fold.at(alpha)), rows)
-                for alpha in self._middles[run].tolist()
-            ]
-            for of_fold, rows in self._folds
+            self._run(place, self._middles[run], convert) for place in range(len(self._folds))
         ]
         return JudgedLevels(self.fitted.path.alphas[run], np.array(scores))
 
     def own_history_at(self, ccp_alpha: float, convert: Convert) -> float:
         """Mean own-history agreement of the folds' trees at one level."""
+        level = np.array([ccp_alpha])
         return float(
-            np.mean(
-                [
-                    _agreement_run(convert(of_fold.at(ccp_alpha)), rows)
-                    for of_fold, rows in self._folds
-                ]
-            )
+            np.mean([self._run(place, level, convert) for place in range(len(self._folds))])
         )
+
+    def _run(self, fold: int, ccp_alphas: FloatArray, convert: Convert) -> list[float]:
+        """Own-history agreement of a fold's trees at some levels."""
+        fitted, rows = self._folds[fold]
+        scores = [_agreement_run(convert(fitted.at(one)), rows) for one in ccp_alphas.tolist()]
+        self._step()
+        return scores
 
 
 def folds(table: DemonstrationTable) -> IntArray:
@@ -148,8 +152,8 @@ def folds(table: DemonstrationTable) -> IntArray:
     """
     shown, position = np.unique(table.demonstration, return_inverse=True)
     if len(shown) == 1:
-        return np.arange(len(table)) * _FOLDS // max(len(table), 1)
-    return position * min(_FOLDS, len(shown)) // len(shown)
+        return np.arange(len(table)) * MOST_FOLDS // max(len(table), 1)
+    return position * min(MOST_FOLDS, len(shown)) // len(shown)
 
 
 def _agreement_run(tree: nodes.Node, rows: DemonstrationTable) -> float:

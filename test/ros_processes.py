@@ -31,7 +31,7 @@ from std_srvs.srv import SetBool, Trigger
 CHECKOUT = Path(__file__).resolve().parents[1]
 
 #: How long a test waits for something that should happen at once, on a busy machine (seconds).
-PATIENCE = 30.0
+PATIENCE = 60.0
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -74,6 +74,12 @@ def own_domain() -> Iterator[int]:
     raise RuntimeError("all ROS domains are in use")
 
 
+def command_of(node: str) -> list[str]:
+    """What starts a node of the checkout like its installed executable does."""
+    blocking = ["/usr/bin/env", "--block-signal=INT,TERM"]
+    return [*blocking, sys.executable, "-m", "rebt_ros.ros.entry", node]
+
+
 class NodeProcess:
     """A node of the package in a process of its own.
 
@@ -83,6 +89,7 @@ class NodeProcess:
         directory: Its working directory; its logs and standard error go there.
         parameters: Values of its parameters.
         arguments: Further ROS arguments, such as remappings.
+        command: What starts it; see `command_of`.
     """
 
     def __init__(
@@ -92,8 +99,9 @@ class NodeProcess:
         directory: Path,
         parameters: Mapping[str, object] | None = None,
         arguments: Sequence[str] = (),
+        command: Sequence[str] | None = None,
     ) -> None:
-        command = [sys.executable, "-m", f"rebt_ros.ros.{module}", "--ros-args"]
+        command = [*(command or command_of(module.removesuffix("_node"))), "--ros-args"]
         for name, value in (parameters or {}).items():
             command += ["-p", f"{name}:={_yaml(value)}"]
         environment = dict(
@@ -111,6 +119,8 @@ class NodeProcess:
                 env=environment,
                 stdout=errors,
                 stderr=errors,
+                # So that all that it starts can be told from what others start.
+                start_new_session=True,
             )
 
     @property
@@ -125,13 +135,23 @@ class NodeProcess:
 
     def catches(self, number: int) -> None:
         """Waits until it has a handler for the signal."""
-        status = Path(f"/proc/{self.process.pid}/status")
+        wait_until(lambda: self._has("SigCgt", number), meanwhile=lambda: None)
 
-        def caught() -> int:
-            line = next(one for one in status.read_text().splitlines() if "SigCgt" in one)
-            return int(line.split()[1], 16) >> (number - 1) & 1
+    def hears(self, number: int) -> None:
+        """Waits until the signal cannot end it any more: it is blocked, then caught.
 
-        wait_until(caught, meanwhile=lambda: None)
+        That takes the few milliseconds in which `env` starts.
+        """
+        wait_until(
+            lambda: any(self._has(kind, number) for kind in ("SigBlk", "SigCgt", "SigIgn")),
+            meanwhile=lambda: None,
+        )
+
+    def _has(self, kind: str, number: int) -> int:
+        """Whether a set of signals in proc(5) has the signal."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        line = next(one for one in status.splitlines() if kind in one)
+        return int(line.split()[1], 16) >> (number - 1) & 1
 
     def stop(self, number: int = signal.SIGINT) -> int:
         """Sends a signal and waits for the end.

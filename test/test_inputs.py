@@ -20,7 +20,7 @@ from rebt_ros.storage import atomic
 from rebt_ros.storage.atomic import StorageError, write_text_atomically
 from rebt_ros.storage.inputs import InputOptions, load
 from rebt_ros.storage.recording import RecordingWriter
-from rebt_ros.storage.tree_file import read_tree, write_tree
+from rebt_ros.storage.tree_file import find_tree, read_tree, write_tree
 
 STATE = "std_msgs/msg/Float64MultiArray"
 ACTION = "std_msgs/msg/String"
@@ -155,6 +155,32 @@ def test_a_malformed_tree_file_is_named(tmp_path):
         read_tree(tmp_path / "nothing.json")
     with pytest.raises(InputError, match="is a directory"):
         read_tree(tmp_path)
+
+
+def test_a_tree_that_may_be_missing_is_found_or_refused(tmp_path):
+    path = tmp_path / "tree.json"
+    assert find_tree(path) is None
+    assert find_tree(tmp_path / "nowhere" / "tree.json") is None
+    write_tree(path, learned())
+    assert find_tree(path) == learned()
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(DocumentError, match=r"tree\.json: the document is not JSON"):
+        find_tree(path)
+    with pytest.raises(InputError, match="is a directory"):
+        find_tree(tmp_path)
+    with pytest.raises(InputError, match="Not a directory"):
+        find_tree(path / "tree.json")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="is no regular file"):
+        find_tree(tmp_path / "pipe")
+
+
+def test_a_file_too_large_for_a_tree_is_not_read(tmp_path):
+    path = tmp_path / "tree.json"
+    with path.open("wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(DocumentError, match="has more than"):
+        read_tree(path)
 
 
 def test_a_reader_sees_the_old_text_or_the_new_one(tmp_path):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import resource
 import signal
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from ros_processes import LATCHED, NodeProcess, Peer, values_of, wait_until
@@ -63,17 +66,44 @@ def _status(peer: Peer, what: str) -> Any:
 
 def _is_alive(process: int) -> bool:
     """Whether it runs; one whose parent has not asked for its exit code yet does not."""
-    directory = Path(f"/proc/{process}")
     try:
-        state = directory.joinpath("stat").read_text().rpartition(")")[2].split()[0]
         # A thread may end later than the process that it belongs to.
-        return state != "Z" or len(list(directory.joinpath("task").iterdir())) > 1
+        return _state(process) != "Z" or len(list(Path(f"/proc/{process}/task").iterdir())) > 1
     except FileNotFoundError:
         return False
 
 
+def _state(process: int) -> str:
+    """The letter that proc(5) has for it."""
+    return _stat(process)[0]
+
+
+def _stat(process: int) -> list[str]:
+    """What stands behind the name of the program: state, parent, ..."""
+    return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+
+
+def _children(parent: int) -> set[int]:
+    """The processes that a process has started and not yet buried."""
+    found = set()
+    for directory in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if _stat(int(directory.name))[1] == str(parent):
+                found.add(int(directory.name))
+    return found
+
+
 def _child(peer: Peer) -> int:
     return int(values_of(_status(peer, ""))["learning process"])
+
+
+def _stuck(peer: Peer) -> tuple[int, Any]:
+    """The learning process, stopped while it should learn, and the future of the answer."""
+    child = _child(peer)
+    os.kill(child, signal.SIGSTOP)
+    call = peer.begin("/learner/relearn")
+    _status(peer, "learning since")
+    return child, call
 
 
 def test_relearn_publishes_writes_and_answers(domain: int, peer: Peer, tmp_path: Path) -> None:
@@ -94,28 +124,54 @@ def test_relearn_publishes_writes_and_answers(domain: int, peer: Peer, tmp_path:
         assert "Traceback" not in learner.stderr
 
 
-def test_the_tree_on_disk_is_published_again(domain: int, peer: Peer, tmp_path: Path) -> None:
-    _record(tmp_path / "demonstrations")
-    with NodeProcess("learner_node", domain, tmp_path) as learner:
-        assert peer.call("/learner/relearn").success
-        assert learner.stop(signal.SIGTERM) == 0
-    with NodeProcess("learner_node", domain, tmp_path):
-        trees = peer.listen(String, "behavior_tree", LATCHED)
-        assert _latest(peer, trees, 1) == read_tree(tmp_path / "learned" / "tree.json")
-
-
-def test_a_broken_tree_on_disk_is_reported_and_not_published(
+def test_after_a_restart_the_tree_on_disk_is_published_again_also_to_a_later_executor(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
     _record(tmp_path / "demonstrations")
-    (tmp_path / "learned").mkdir()
-    (tmp_path / "learned" / "tree.json").write_text("{")
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        assert peer.call("/learner/relearn").success
+        learner.stop(signal.SIGKILL)
+    learned = read_tree(tmp_path / "learned" / "tree.json")
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        trees = peer.listen(String, "behavior_tree", LATCHED)
+        assert _latest(peer, trees, 1) == learned
+        with NodeProcess("executor_node", domain, tmp_path):
+            status = peer.wait_until(
+                lambda: (
+                    (one := peer.diagnostics.get("executor: execution"))
+                    and "nodes" in values_of(one)
+                    and one
+                ),
+                what="an executor with a tree",
+            )
+            assert values_of(status)["rows"] == str(learned.provenance.rows)
+
+
+def test_a_broken_tree_on_disk_is_reported_and_left_alone(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    tree = tmp_path / "learned" / "tree.json"
+    tree.parent.mkdir()
+    tree.write_text('{"format": "rebt_ros/behavior_tree", "ver')
     with NodeProcess("learner_node", domain, tmp_path) as learner:
         learner.says("the tree on disk is not published")
         trees = peer.listen(String, "behavior_tree", LATCHED)
+        assert _status(peer, "is not JSON").level == DiagnosticStatus.WARN
+        assert tree.read_text() == '{"format": "rebt_ros/behavior_tree", "ver'
         assert peer.call("/learner/relearn").success
-        _latest(peer, trees, 1)
+        assert _latest(peer, trees, 1) == read_tree(tree)
         assert len(trees) == 1
+
+
+def test_a_pipe_in_place_of_the_tree_does_not_hold_up_the_node(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    (tmp_path / "learned").mkdir()
+    os.mkfifo(tmp_path / "learned" / "tree.json")
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        learner.says("is no regular file")
+        assert learner.stop() == 0
 
 
 def test_bad_demonstrations_keep_the_tree_before(domain: int, peer: Peer, tmp_path: Path) -> None:
@@ -167,10 +223,7 @@ def test_a_second_call_is_refused_while_one_is_under_way(
 ) -> None:
     _record(tmp_path / "demonstrations")
     with NodeProcess("learner_node", domain, tmp_path):
-        child = _child(peer)
-        os.kill(child, signal.SIGSTOP)
-        first = peer.begin("/learner/relearn")
-        _status(peer, "learning since")
+        child, first = _stuck(peer)
         second = peer.call("/learner/relearn")
         assert (second.success, "busy" in second.message) == (False, True)
         assert not first.done()
@@ -180,23 +233,127 @@ def test_a_second_call_is_refused_while_one_is_under_way(
         assert peer.call("/learner/relearn").success
 
 
+def test_learning_can_be_cancelled_and_the_tree_before_stays(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        idle = peer.call("/learner/cancel")
+        assert (idle.success, "nothing to cancel" in idle.message) == (False, True)
+        trees = peer.listen(String, "behavior_tree", LATCHED)
+        assert peer.call("/learner/relearn").success
+        before = _latest(peer, trees, 1)
+        _record(tmp_path / "demonstrations")
+        child, call = _stuck(peer)
+        assert _children(learner.process.pid) == {child}
+        answer = peer.call("/learner/cancel")
+        assert (answer.success, "was cancelled" in answer.message) == (True, True)
+        assert _children(learner.process.pid) == set()
+        peer.wait_until(call.done, what="the answer of what was cancelled")
+        assert (call.result().success, "was cancelled" in call.result().message) == (False, True)
+        assert _status(peer, "was cancelled").level == DiagnosticStatus.OK
+        assert read_tree(tmp_path / "learned" / "tree.json") == before
+        assert "nothing to cancel" in peer.call("/learner/cancel").message
+        again = peer.call("/learner/relearn")
+        assert "2 demonstrations" in again.message
+        assert _latest(peer, trees, 2).provenance.demonstrations == 2
+        assert len(trees) == 2
+        assert learner.stop() == 0
+        assert "Traceback" not in learner.stderr
+
+
+def test_learning_that_takes_too_long_is_stopped(domain: int, peer: Peer, tmp_path: Path) -> None:
+    _record(tmp_path / "demonstrations")
+    with NodeProcess("learner_node", domain, tmp_path, {"relearn_timeout": 1.5}) as learner:
+        _, call = _stuck(peer)
+        peer.wait_until(call.done, what="the answer")
+        answer = call.result()
+        assert (answer.success, "relearn_timeout (1.5 s)" in answer.message) == (False, True)
+        assert _children(learner.process.pid) == set()
+        assert _status(peer, "relearn_timeout").level == DiagnosticStatus.WARN
+        _set(peer, relearn_timeout=0.0)
+        assert peer.call("/learner/relearn").success
+
+
+def test_progress_is_on_diagnostics(domain: int, peer: Peer, tmp_path: Path) -> None:
+    _record(tmp_path / "demonstrations")
+    with NodeProcess("learner_node", domain, tmp_path):
+        assert values_of(_status(peer, ""))["stage"] == "idle"
+        heard = peer.listen(DiagnosticArray, "/diagnostics")
+        assert peer.call("/learner/relearn").success
+        peer.wait_until(lambda: heard and "Learned" in heard[-1].status[0].message)
+    said = [values_of(one) for message in heard for one in message.status]
+    shares = {one["stage"]: int(one["progress (%)"]) for one in said if "progress (%)" in one}
+    stages = [stage for stage in shares if stage != "starting"]
+    assert stages[:3] == ["reading", "choosing", "judging"]
+    percents = [shares[stage] for stage in stages]
+    assert percents == sorted(percents)
+    assert percents[0] == 0 < percents[1] < percents[2] < 100
+
+
+def test_notes_of_the_learning_are_in_the_answer_and_in_the_log(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with RecordingWriter(tmp_path / "demonstrations", FEATURES, ["action"]) as writer:
+        for step in range(60):
+            x = float(step % 10)
+            row = Row(step * step, "action", "go" if x > 4 else "turn", None, (x, x))
+            writer.write(row)
+    with NodeProcess("learner_node", domain, tmp_path, {"lags": 1}) as learner:
+        answer = peer.call("/learner/relearn")
+        assert answer.success, answer.message
+        assert "Note: the rows of channel 'action' are not evenly spaced" in answer.message
+        learner.says("[WARN]")
+        learner.says("are not evenly spaced, so that")
+
+
 def test_a_learning_process_that_dies_is_replaced(domain: int, peer: Peer, tmp_path: Path) -> None:
     _record(tmp_path / "demonstrations")
     with NodeProcess("learner_node", domain, tmp_path):
-        child = _child(peer)
-        os.kill(child, signal.SIGSTOP)
-        call = peer.begin("/learner/relearn")
-        _status(peer, "learning since")
+        child, call = _stuck(peer)
         os.kill(child, signal.SIGKILL)
         peer.wait_until(call.done, what="the answer")
         assert (call.result().success, "was killed" in call.result().message) == (False, True)
         assert peer.call("/learner/relearn").success
         # Also when it dies while it has nothing to do.
-        peer.wait_until(lambda: _child(peer) != child, what="another learning process")
-        idle = _child(peer)
+        idle = int(values_of(_status(peer, "Learned"))["learning process"])
+        assert idle != child
         os.kill(idle, signal.SIGKILL)
         wait_until(lambda: not _is_alive(idle), what="its death")
         assert peer.call("/learner/relearn").success
+
+
+def test_the_node_outlives_a_lack_of_memory(domain: int, peer: Peer, tmp_path: Path) -> None:
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        child = _child(peer)
+        # An answer means that it has loaded what it needs.
+        assert not peer.call("/learner/relearn").success
+        in_use = int(Path(f"/proc/{child}/statm").read_text().split()[0]) * resource.getpagesize()
+        room = in_use + 2_000_000
+        resource.prlimit(child, resource.RLIMIT_AS, (room, room))
+        _record(tmp_path / "demonstrations", rows=20_000)
+        answer = peer.call("/learner/relearn")
+        assert (answer.success, "memory" in answer.message) == (False, True)
+        assert learner.process.poll() is None
+        os.kill(child, signal.SIGKILL)
+        wait_until(lambda: not _is_alive(child), what="its death")
+        _set(peer, max_depth=2, ccp_alpha=0.0)
+        assert peer.call("/learner/relearn").success
+
+
+def test_an_error_that_nobody_expected_ends_the_call_only(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    # Python's pathlib has an exception of its own for a link to itself.
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    with NodeProcess("learner_node", domain, tmp_path, {"output": tmp_path / "loop"}) as learner:
+        assert not peer.call("/learner/relearn").success
+        _set(peer, output="~of nobody/learned")
+        assert "there is no such home" in peer.call("/learner/relearn").message
+        _set(peer, output=str(tmp_path / "learned"))
+        assert peer.call("/learner/relearn").success
+        assert learner.stop() == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -205,10 +362,7 @@ def test_a_signal_while_learning_ends_node_and_child(
 ) -> None:
     _record(tmp_path / "demonstrations")
     with NodeProcess("learner_node", domain, tmp_path) as learner:
-        child = _child(peer)
-        os.kill(child, signal.SIGSTOP)
-        peer.begin("/learner/relearn")
-        _status(peer, "learning since")
+        child, _ = _stuck(peer)
         assert learner.stop(number) == 0
         assert not _is_alive(child)
         assert "Traceback" not in learner.stderr
@@ -223,6 +377,33 @@ def test_the_learning_process_does_not_outlive_a_killed_node(
         assert _is_alive(child)
         learner.stop(signal.SIGKILL)
         wait_until(lambda: not _is_alive(child), what="the end of the learning process")
+
+
+def test_a_learning_process_that_is_stuck_in_a_library_ends_with_the_node(
+    domain: int, peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As sum() does not let other threads run, this process cannot hear that its input has ended.
+    (tmp_path / "sklearn.py").write_text("open('stuck', 'w')\nsum(range(10**15))\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        wait_until((tmp_path / "stuck").exists, what="a process that is stuck")
+        child = _child(peer)
+        learner.stop(signal.SIGKILL)
+        wait_until(lambda: not _is_alive(child), what="the end of the learning process")
+
+
+def test_the_learning_process_stands_back_for_the_nodes(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        child, node = _child(peer), learner.process.pid
+
+        def sacrificed(process: int) -> int:
+            return int(Path(f"/proc/{process}/oom_score_adj").read_text())
+
+        wait_until(lambda: sacrificed(child) > sacrificed(node))
+        nicer = os.getpriority(os.PRIO_PROCESS, child) - os.getpriority(os.PRIO_PROCESS, node)
+        assert nicer > 0
 
 
 def test_a_tree_that_cannot_be_written_is_not_published(

@@ -150,6 +150,15 @@ def test_every_entry_point_can_be_loaded() -> None:
 
 
 @needs_installation
+def test_every_node_begins_where_signals_are_heard_at_once() -> None:
+    scripts = metadata.distribution(PACKAGE).entry_points.select(group="console_scripts")
+    nodes = {one.name for one in scripts if one.value.startswith(f"{PACKAGE}.ros.")}
+    modules = (path.stem.removesuffix("_node") for path in SOURCES if path.stem.endswith("_node"))
+    assert nodes == set(modules)
+    assert {one.module for one in scripts if one.name in nodes} == {f"{PACKAGE}.ros.entry"}
+
+
+@needs_installation
 def test_the_parameter_files_are_installed() -> None:
     ament_index_python = pytest.importorskip("ament_index_python")
     share = Path(ament_index_python.get_package_share_directory(PACKAGE))

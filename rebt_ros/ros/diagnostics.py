@@ -104,7 +104,7 @@ class Faults:
         self._latest = (sentence, now)
         if now - self._logged.get(kind, -math.inf) >= _QUIET:
             self._logged[kind] = now
-            # Two lines: rclpy refuses to log from one line with a severity, then with another.
+            # On two lines: rclpy refuses another severity from the same one.
             if severe:
                 self._logger.error(sentence)
             else:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
+import traceback
+from collections.abc import Sequence
 from typing import Any, Final
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
@@ -20,18 +22,31 @@ from rebt_ros.demonstration.schema import LARGEST_LAG
 from rebt_ros.errors import RebtError
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
-from rebt_ros.ros.learning_process import LearningProcess, Request
+from rebt_ros.ros.learning_process import (
+    LearningCancelledError,
+    LearningError,
+    LearningProcess,
+    Progress,
+    Request,
+)
 from rebt_ros.ros.parameters import Parameters
 from rebt_ros.storage.atomic import write_text_atomically
-from rebt_ros.storage.tree_file import read_tree
+from rebt_ros.storage.tree_file import find_tree
 
 #: Who subscribes later gets the latest tree, too.
 TREE_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 _TREE_FILE: Final = "tree.json"
 
-#: One thread learns, while others answer a second call, parameters, and diagnostics.
-_THREADS: Final = 4
+#: One thread learns, one waits for the end of what it cancels, and others answer further calls,
+#: parameters, and diagnostics.
+_THREADS: Final = 5
+
+#: What comes once nothing can be cancelled any more.
+_PUBLISHING: Final = Progress("publishing", 1.0)
+
+#: So many notes are part of the answer; all of them are in the log.
+_NOTES_ANSWERED: Final = 3
 
 _USES: Final = ("auto", "always", "never")
 
@@ -40,7 +55,7 @@ _LAST_ANSWER: Final = 1.0
 
 
 class LearnerNode(Node):
-    """Offers ``~/relearn``; learning itself takes place in a `LearningProcess`.
+    """Offers ``~/relearn`` and ``~/cancel``; learning takes place in a `LearningProcess`.
 
     A tree that was learned is written to disk first and published then; when learning fails, the
     tree before it stays in both places.
@@ -51,27 +66,36 @@ class LearnerNode(Node):
 
     def __init__(self) -> None:
         super().__init__("learner")
-        self._busy = threading.Lock()
-        self._since = 0.0
+        self._lock = threading.Lock()
+        self._call: _Call | None = None
         self._last = Report(Level.OK, "idle: nothing was learned yet")
         self._learned: LearnedTree | None = None
         self._declare()
         self._publisher = self.create_publisher(String, "behavior_tree", TREE_QOS)
         self._publish_what_is_on_disk()
         self._process = LearningProcess()
-        self._process.start()
-        self.create_service(
-            Trigger, "~/relearn", self._relearn, callback_group=ReentrantCallbackGroup()
-        )
+        try:
+            self._process.start()
+        except LearningError as err:
+            # There may be room for it once somebody wants it to learn.
+            self.get_logger().warning(str(err))
         self._diagnostics = Diagnostics(
             self, "learning", self._report, MutuallyExclusiveCallbackGroup()
         )
+        group = ReentrantCallbackGroup()
+        self.create_service(Trigger, "~/relearn", self._relearn, callback_group=group)
+        self.create_service(Trigger, "~/cancel", self._cancel, callback_group=group)
+
+    def interrupt(self) -> None:
+        """Ends the learning process, also while it learns, and with it a call of ~/relearn."""
+        self._process.close()
 
     def close(self) -> None:
-        """Ends the learning process, also while it learns."""
+        """Waits for a tree that is being written."""
         self._process.close()
-        if self._busy.acquire(timeout=_LAST_ANSWER):
-            self._busy.release()
+        call = self._call
+        if call is not None:
+            call.over.wait(_LAST_ANSWER)
 
     def _declare(self) -> None:
         declare = Parameters(self)
@@ -83,6 +107,14 @@ class LearnerNode(Node):
         )
         self._output = declare.directory(
             "output", "learned", "Directory that tree.json is written to.", fixed=False
+        )
+        self._timeout = declare.number(
+            "relearn_timeout",
+            0.0,
+            "Learning that takes longer is stopped (seconds); 0.0 for no limit.",
+            0.0,
+            1e6,
+            fixed=False,
         )
         self._max_depth = declare.integer(
             "max_depth", 0, "Splits on the longest path; 0 for no limit.", 0, 100, fixed=False
@@ -167,27 +199,51 @@ class LearnerNode(Node):
         }
 
     def _relearn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if not self._busy.acquire(blocking=False):
+        call = _Call()
+        with self._lock:
+            other = self._call
+            if other is None:
+                self._call = call
+        if other is not None:
             response.message = (
-                f"busy: learning since {time.monotonic() - self._since:.0f} s, "
-                "call again when that is done."
+                f"busy: {other}; call again when that is done, or ~/cancel to cancel it."
             )
             return response
         try:
-            self._since = time.monotonic()
-            response.message = self._learn()
+            response.message = self._learn(call)
             response.success = True
-            self._last = Report(Level.OK, response.message)
-            self.get_logger().info(response.message)
+            self._end(Level.OK, response.message)
+        except LearningCancelledError as err:
+            response.message = str(err)
+            self._end(Level.OK, response.message)
         except RebtError as err:
             response.message = str(err)
-            self._last = Report(Level.WARN, response.message)
-            self.get_logger().error(response.message)
+            self._end(Level.WARN, response.message)
+        except Exception as err:
+            # The node lives on.  Once its context is shut down, all that rclpy does raises.
+            if self.context.ok():
+                response.message = (
+                    f"learning failed, which is a mistake in rebt_ros ({type(err).__name__}: "
+                    f"{err}): please report it, with the learner's log."
+                )
+                self.get_logger().error(traceback.format_exc())
+                self._end(Level.ERROR, response.message)
         finally:
-            self._busy.release()
+            with self._lock:
+                self._call = None
+            call.over.set()
         return response
 
-    def _learn(self) -> str:
+    def _end(self, level: Level, message: str) -> None:
+        """Notes how a call ended."""
+        self._last = Report(level, message)
+        # On two lines: rclpy refuses another severity from the same one.
+        if level is Level.OK:
+            self.get_logger().info(message)
+        else:
+            self.get_logger().error(message)
+
+    def _learn(self, call: _Call) -> str:
         """Learns, writes and publishes; returns what a person wants to know."""
         request = Request(
             str(self._demonstrations()),
@@ -200,24 +256,56 @@ class LearnerNode(Node):
             self._categorical(),
         )
         path = self._output() / _TREE_FILE
-        lesson = self._process.ask(request)
+        lesson = self._process.ask(
+            request,
+            cancelled=call.cancelled,
+            limit=self._timeout() or None,
+            progress=lambda progress: self._note(call, progress),
+        )
         for note in lesson.notes:
-            self.get_logger().warning(note)
+            self.get_logger().warning(f"{note}.")
         learned = loads(lesson.document)
+        with self._lock:
+            if call.cancelled.is_set():
+                raise LearningCancelledError
+            call.progress = _PUBLISHING
         write_text_atomically(path, lesson.document)
         self._publish(learned, lesson.document)
-        return f"{lesson.sentence} It is published and in {path}."
+        return f"{lesson.sentence} It is published and in {path}.{_in_short(lesson.notes)}"
+
+    def _note(self, call: _Call, progress: Progress) -> None:
+        entered = progress.stage != call.progress.stage
+        call.progress = progress
+        if entered:
+            self._diagnostics.publish()
+
+    def _cancel(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        with self._lock:
+            call = self._call
+            late = call is not None and call.progress is _PUBLISHING
+            if call is not None and not late:
+                call.cancelled.set()
+        if call is None:
+            response.message = "there is nothing to cancel: nothing is being learned."
+        elif late:
+            response.message = "it is too late to cancel: the tree is being published."
+        else:
+            self._process.cancel()
+            call.over.wait()
+            response.success = True
+            response.message = "learning was cancelled: the tree before it stays."
+        return response
 
     def _publish_what_is_on_disk(self) -> None:
         path = self._output() / _TREE_FILE
-        if not path.exists():
-            self.get_logger().info(f"there is no tree in {path} yet: call ~/relearn to learn one.")
-            return
         try:
-            learned = read_tree(path)
+            learned = find_tree(path)
         except RebtError as err:
-            self._last = Report(Level.WARN, str(err))
-            self.get_logger().warning(f"the tree on disk is not published: {err}")
+            self._last = Report(Level.WARN, f"the tree on disk is not published: {err}")
+            self.get_logger().warning(self._last.message)
+            return
+        if learned is None:
+            self.get_logger().info(f"there is no tree in {path} yet: call ~/relearn to learn one.")
             return
         self._publish(learned, dumps(learned))
         self._last = Report(Level.OK, f"idle: published the tree in {path}")
@@ -228,7 +316,7 @@ class LearnerNode(Node):
         self._publisher.publish(String(data=document))
 
     def _report(self) -> Report:
-        values: dict[str, Any] = {"learning process": self._process.id}
+        values: dict[str, Any] = {"learning process": self._process.id or "none"}
         if self._learned is not None:
             provenance = self._learned.provenance
             values |= {
@@ -238,10 +326,35 @@ class LearnerNode(Node):
                 "demonstrations": provenance.demonstrations,
                 "own-history agreement": provenance.figures.own_history_agreement,
             }
-        if self._busy.locked():
-            seconds = time.monotonic() - self._since
-            return Report(Level.OK, f"learning since {seconds:.0f} s", values)
-        return Report(self._last.level, self._last.message, values)
+        call = self._call
+        if call is not None:
+            progress = call.progress
+            values |= {"stage": progress.stage, "progress (%)": round(100 * progress.share)}
+            return Report(Level.OK, str(call), values)
+        return Report(self._last.level, self._last.message, values | {"stage": "idle"})
+
+
+class _Call:
+    """A call of ``~/relearn`` that is under way."""
+
+    def __init__(self) -> None:
+        self.since = time.monotonic()
+        self.progress = Progress("starting", 0.0)
+        self.cancelled = threading.Event()
+        self.over = threading.Event()
+
+    def __str__(self) -> str:
+        seconds = time.monotonic() - self.since
+        return f"learning since {seconds:.0f} s ({self.progress.stage}, {self.progress.share:.0%})"
+
+
+def _in_short(notes: Sequence[str]) -> str:
+    """The first notes, for an answer."""
+    if not notes:
+        return ""
+    more = len(notes) - _NOTES_ANSWERED
+    rest = f"; and {more} more, see the log" if more > 0 else ""
+    return f" Note: {'; '.join(notes[:_NOTES_ANSWERED])}{rest}."
 
 
 def main(args: list[str] | None = None) -> None:

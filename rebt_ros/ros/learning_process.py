@@ -1,28 +1,31 @@
-"""Learning in a process of its own, so that a node answers, and ends, at any moment.
+"""Learning in a process of its own, so that the node answers, and ends, whatever happens there.
 
-The node writes one JSON line per request to the process's standard input and reads one JSON line
-per reply from its standard output.  The process ends with its standard input, which means with the
-node, whatever way that ends.  This module needs no ROS.
+The node's side.  It writes one JSON line per request to the process's standard input and reads JSON
+lines from its standard output: progress, as often as there is any, and then one reply.  The other
+side is `rebt_ros.ros.learning_worker`.  Both need no ROS.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
-import queue
 import signal
 import subprocess
 import sys
 import threading
-import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from enum import Enum
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, Final
 
 import rebt_ros
-from rebt_ros.errors import OptionError, RebtError
+from rebt_ros.errors import RebtError
+
+_WORKER: Final = "rebt_ros.ros.learning_worker"
+
+#: How long a process that has closed its output may take to end (seconds).
+_LAST_BREATH: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +40,15 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a request is."""
+
+    stage: str
+    share: float
+    """Of the work, from 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
 class Lesson:
     """What was learned."""
 
@@ -45,184 +57,219 @@ class Lesson:
     sentence: str
     """What was learned, for people."""
     notes: Sequence[str] = ()
-    """What a person should know about the recordings."""
+    """What a person should know about the recordings and about the tree; no full stops."""
 
 
 class LearningError(RebtError):
     """Nothing was learned; the message says why."""
 
 
-class LearningProcess:
-    """The node's side: starts the process and speaks to it.
+class LearningCancelledError(LearningError):
+    """It was not wanted any more."""
 
-    One thread at a time may ask; any thread may close.
+    def __init__(self) -> None:
+        super().__init__("learning was cancelled: the tree before it stays.")
+
+
+class LearningProcess:
+    """Starts the process and speaks to it.
+
+    One thread at a time may ask; any thread may cancel and close.
     """
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
-        self._closed = False
         self._lock = threading.Lock()
+        # What follows is guarded by the lock.
+        self._closed = False
+        self._asked = False
+        self._stopped: LearningError | None = None
 
     @property
     def id(self) -> int | None:
-        """The process's id, if one was started."""
-        return None if self._process is None else self._process.pid
+        """The process's id; None if there is none."""
+        # Who asks whether a process has ended gives its id free: not while another thread kills it.
+        with self._lock:
+            process = self._process
+            return None if process is None or process.poll() is not None else process.pid
 
     def start(self) -> None:
-        """Starts the process unless it runs, so that it is ready when it is asked."""
+        """Starts the process unless it runs, so that it is ready when it is asked.
+
+        Raises:
+            LearningError: It cannot be started.
+        """
         with self._lock:
-            if self._closed or (self._process is not None and self._process.poll() is None):
-                return
-            self._reap()
-            package = Path(rebt_ros.__file__).parents[1]
-            paths = [str(package), os.environ.get("PYTHONPATH", "")]
+            self._started()
+
+    def ask(
+        self,
+        request: Request,
+        *,
+        cancelled: threading.Event,
+        limit: float | None = None,
+        progress: Callable[[Progress], None] = lambda progress: None,
+    ) -> Lesson:
+        """Learns; takes as long as that takes.
+
+        Args:
+            request: What to learn.
+            cancelled: Set by whoever calls `cancel`, before that: it may come before the request.
+            limit: How long it may take (seconds); None for any time.
+            progress: Told how far it is, in this thread.
+
+        Raises:
+            LearningCancelledError: It was cancelled.
+            LearningError: The demonstrations or options cannot be used, it took too long, or the
+                process ended.
+        """
+        with self._lock:
+            if cancelled.is_set():
+                raise LearningCancelledError
+            process = self._started()
+            self._asked, self._stopped = True, None
+        try:
+            with self._limited(limit):
+                reply = _converse(process, request, progress)
+        except Exception:
+            # What it still says must not be taken for the next reply.
+            with self._lock:
+                _kill(process)
+            process.wait()
+            raise
+        finally:
+            with self._lock:
+                self._asked = False
+        if self._stopped is not None:
+            process.wait()
+            raise self._stopped
+        if reply is None:
+            raise LearningError(
+                f"the learning process {_ending(process)}: call again to try once more."
+            )
+        if "error" in reply:
+            raise LearningError(reply["error"])
+        return Lesson(**reply)
+
+    def cancel(self) -> bool:
+        """Ends the process if it is learning, and whoever asked it is told so.
+
+        Returns:
+            Whether it was learning.
+        """
+        return self._stop(LearningCancelledError())
+
+    def close(self) -> None:
+        """Ends the process at once; whoever waits for its reply gets a `LearningError`."""
+        self._stop(LearningError("the learner is shutting down."))
+        with self._lock:
+            self._closed = True
+            process = self._process
+            if process is not None:
+                _kill(process)
+        if process is not None:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(_LAST_BREATH)
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        """The process, which runs."""
+        if self._closed:
+            raise LearningError("the learner is shutting down.")
+        if self._process is not None and self._process.poll() is None:
+            return self._process
+        if self._process is not None:
+            _close_pipes(self._process)
+        package = Path(rebt_ros.__file__).parents[1]
+        paths = [str(package), os.environ.get("PYTHONPATH", "")]
+        try:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", __name__],
+                [sys.executable, "-P", "-m", _WORKER, str(os.getpid())],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 env=dict(os.environ, PYTHONPATH=os.pathsep.join(filter(None, paths))),
                 # Control-C in a terminal is for the node alone.
                 process_group=0,
             )
+        except OSError as err:
+            raise LearningError(
+                f"the learning process cannot be started ({err.strerror or err}): "
+                "free memory or processes and call again."
+            ) from err
+        return self._process
 
-    def ask(self, request: Request) -> Lesson:
-        """Learns; takes as long as that takes.
-
-        Raises:
-            LearningError: The demonstrations or options cannot be used, or the process ended; in
-                that case a new one is started for the next time.
-        """
-        self.start()
-        process = self._process
-        if process is None:
-            raise LearningError("the learner is shutting down.")
-        assert process.stdin is not None
-        assert process.stdout is not None
+    @contextlib.contextmanager
+    def _limited(self, limit: float | None) -> Iterator[None]:
+        """Ends the process where the block takes longer."""
+        if limit is None:
+            yield
+            return
+        error = LearningError(
+            f"learning took longer than relearn_timeout ({limit:g} s) and was stopped: "
+            "allow more time or learn from fewer rows."
+        )
+        timer = threading.Timer(limit, self._stop, [error])
+        timer.daemon = True
+        timer.start()
         try:
-            process.stdin.write(json.dumps(asdict(request)).encode() + b"\n")
-            process.stdin.flush()
-            line = process.stdout.readline()
-        except (OSError, ValueError):
-            line = b""
-        if not line.endswith(b"\n"):
-            why = _ending(process.wait())
-            self.start()
-            raise LearningError(f"the learning process {why}: call again to try once more.")
-        reply = json.loads(line)
-        if "error" in reply:
-            raise LearningError(reply["error"])
-        return Lesson(**reply)
+            yield
+        finally:
+            timer.cancel()
 
-    def close(self) -> None:
-        """Ends the process at once; whoever waits for its reply gets a `LearningError`."""
+    def _stop(self, why: LearningError) -> bool:
+        """Ends the process if it is being asked."""
         with self._lock:
-            self._closed = True
-            if self._process is not None:
-                self._process.kill()
-                self._process.wait()
-
-    def _reap(self) -> None:
-        if self._process is not None:
-            for pipe in (self._process.stdin, self._process.stdout):
-                assert pipe is not None
-                try:
-                    pipe.close()
-                except OSError:
-                    # What could not be written to a process that has ended.
-                    continue
+            if not self._asked or self._stopped is not None or self._process is None:
+                return False
+            self._stopped = why
+            _kill(self._process)
+            return True
 
 
-def _ending(code: int) -> str:
+def _converse(
+    process: subprocess.Popen[bytes], request: Request, progress: Callable[[Progress], None]
+) -> dict[str, Any] | None:
+    """The reply to a request; None where the process ended, or spoke nonsense, before it."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    try:
+        process.stdin.write(json.dumps(asdict(request)).encode() + b"\n")
+        process.stdin.flush()
+        for line in process.stdout:
+            said = json.loads(line)
+            if "stage" not in said:
+                return dict(said)
+            progress(Progress(**said))
+    except (OSError, ValueError):
+        # The last line may be cut short.
+        return None
+    return None
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """Ends a process, and those that it has started, at once."""
+    if process.poll() is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def _close_pipes(process: subprocess.Popen[bytes]) -> None:
+    for pipe in (process.stdin, process.stdout):
+        assert pipe is not None
+        # What could not be written to a process that has ended.
+        with contextlib.suppress(OSError):
+            pipe.close()
+
+
+def _ending(process: subprocess.Popen[bytes]) -> str:
+    """How a process ended that has closed its output."""
+    try:
+        code = process.wait(_LAST_BREATH)
+    except subprocess.TimeoutExpired:
+        _kill(process)
+        process.wait()
+        return "did not speak any more"
     if code == -signal.SIGKILL:
         return "was killed, perhaps for lack of memory"
     if code < 0:
         return f"was ended by {signal.Signals(-code).name}"
     return f"ended unexpectedly with code {code}"
-
-
-def main() -> None:
-    """The process's side: learns whenever a line asks it to, until its input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(sys.stdin.buffer, requests), daemon=True).start()
-    # What a library may print must not come between the replies.
-    replies = os.fdopen(os.dup(sys.stdout.fileno()), "wb", buffering=0)
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    _warm_up()
-    while True:
-        reply = _reply(requests.get())
-        replies.write(json.dumps(reply).encode() + b"\n")
-
-
-def _listen(requests: BinaryIO, waiting: queue.SimpleQueue[bytes]) -> None:
-    for line in requests:
-        waiting.put(line)
-    # The node has ended: so does this process, in the middle of learning, too.
-    os._exit(0)
-
-
-def _warm_up() -> None:
-    """Imports what takes long to import; what is missing is reported once it is asked for."""
-    try:
-        import rebt_ros.pipeline  # noqa: F401
-    except ImportError:
-        return
-
-
-def _reply(line: bytes) -> dict[str, Any]:
-    try:
-        return asdict(learn(Request(**json.loads(line))))
-    except RebtError as err:
-        return {"error": str(err)}
-    except ImportError as err:
-        return {"error": f"{err.name or err} is not installed: install it and call again."}
-    except MemoryError:
-        return {"error": "the memory does not suffice: learn from fewer demonstrations."}
-    except Exception as err:
-        traceback.print_exc()
-        return {
-            "error": f"learning failed, which is a mistake in rebt_ros ({type(err).__name__}: "
-            f"{err}): please report it, with the learner's log."
-        }
-
-
-def learn(request: Request) -> Lesson:
-    """Learns from all recordings of a directory, in this process.
-
-    Raises:
-        RebtError: They cannot be used, or an option makes no sense.
-    """
-    from rebt_ros import pipeline
-    from rebt_ros.behavior_tree.document import dumps
-    from rebt_ros.behavior_tree.learned_tree import Root
-    from rebt_ros.decision_tree.upsampling import Upsampling
-    from rebt_ros.demonstration.schema import FeatureKind
-    from rebt_ros.options import LearnOptions, Use
-    from rebt_ros.storage.recording import read_recording, recordings
-
-    twice = set(request.binary_features) & set(request.categorical_features)
-    if twice:
-        raise OptionError(f"feature {min(twice)!r} cannot be both binary and categorical.")
-    declared = {
-        **dict.fromkeys(request.binary_features, FeatureKind.BINARY),
-        **dict.fromkeys(request.categorical_features, FeatureKind.CATEGORICAL),
-    }
-    kinds: dict[str, type[Enum]] = {
-        "root": Root,
-        "psa": Use,
-        "last_action": Use,
-        "upsample": Upsampling,
-    }
-    chosen: dict[str, Any] = {
-        name: kinds[name](value) if name in kinds else value
-        for name, value in request.options.items()
-    }
-    options = LearnOptions(**chosen)
-    reads = [read_recording(path) for path in recordings(Path(request.demonstrations))]
-    learned = pipeline.learn([read.demonstration for read in reads], options, declared)
-    notes = [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
-    return Lesson(dumps(learned), pipeline.summary_sentence(learned), notes)
-
-
-if __name__ == "__main__":
-    main()

@@ -31,6 +31,7 @@ from rclpy.signals import (
 from rclpy.utilities import ok, try_shutdown
 
 from rebt_ros.errors import RebtError
+from rebt_ros.ros.entry import STOP_SIGNALS
 
 #: What a user can get wrong with a node's arguments, parameters and remappings.
 _WRONG_START = (
@@ -42,14 +43,13 @@ _WRONG_START = (
     InvalidTopicNameException,
 )
 
-_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
 
 def run(factory: Callable[[], Node], args: list[str] | None = None, *, threads: int = 1) -> None:
     """Runs a node until SIGINT, SIGTERM or a shutdown of its context.
 
-    A signal never interrupts a callback, only the spinning between callbacks.  A node that has a
-    method ``close()`` gets it called, outside of any callback, before it is destroyed.
+    A signal never interrupts a callback, only the spinning between callbacks.  A node that has
+    callbacks which take long has a method ``interrupt()`` that makes them return.  A node that has
+    a method ``close()`` gets it called, outside of any callback, before it is destroyed.
 
     Args:
         factory: Makes the node; called once ROS is initialized.
@@ -87,9 +87,7 @@ def _live(factory: Callable[[], Node], threads: int, stopped: Callable[[], bool]
     try:
         _spin(node, threads, stopped)
     finally:
-        close = getattr(node, "close", None)
-        if close is not None:
-            close()
+        _call(node, "close")
         node.destroy_node()
 
 
@@ -109,8 +107,15 @@ def _spin(node: Node, threads: int, stopped: Callable[[], bool]) -> None:
         if ok():
             raise
     finally:
+        _call(node, "interrupt")
         if executor is not None:
             executor.shutdown()
+
+
+def _call(node: Node, name: str) -> None:
+    method = getattr(node, name, None)
+    if method is not None:
+        method()
 
 
 @contextmanager
@@ -122,7 +127,7 @@ def _noted_signals() -> Iterator[Callable[[], bool]]:
     """
     came: list[int] = []
     before = {
-        one: signal.signal(one, lambda number, _: came.append(number)) for one in _STOP_SIGNALS
+        one: signal.signal(one, lambda number, _: came.append(number)) for one in STOP_SIGNALS
     }
     try:
         yield lambda: bool(came)

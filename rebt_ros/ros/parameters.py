@@ -104,14 +104,20 @@ class Parameters:
         """A directory; ``~`` is the user's home.
 
         Raises:
-            OptionError: It is empty.
+            OptionError: It is empty, or the home of nobody.
         """
         read = self.text(name, default, description, fixed=fixed)
 
         def path() -> Path:
             if not read():
                 raise OptionError(f"parameter {name!r} is empty: give it a directory.")
-            return Path(read()).expanduser()
+            try:
+                return Path(read()).expanduser()
+            except RuntimeError as err:
+                raise OptionError(
+                    f"parameter {name!r} is {read()!r}, but there is no such home: "
+                    "write out the directory."
+                ) from err
 
         path()
         return path

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import stat
 from pathlib import Path
 
-from rebt_ros.behavior_tree.document import dumps, loads
+from rebt_ros.behavior_tree.document import LARGEST_DOCUMENT, dumps, loads
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.errors import DocumentError
+from rebt_ros.errors import DocumentError, InputError
 from rebt_ros.storage.atomic import write_text_atomically
-from rebt_ros.storage.text import read_text
+from rebt_ros.storage.text import read_text, unreadable
+
+#: A character has four bytes at most.
+_LARGEST_FILE = 4 * LARGEST_DOCUMENT
 
 
 def read_tree(path: Path) -> LearnedTree:
@@ -18,11 +22,32 @@ def read_tree(path: Path) -> LearnedTree:
         InputError: There is no such text file.
         DocumentError: It is not a valid document.
     """
+    if path.is_file() and path.stat().st_size > _LARGEST_FILE:
+        raise DocumentError(f"{path} has more than {_LARGEST_FILE} bytes: this is no document.")
     text = read_text(path)
     try:
         return loads(text)
     except DocumentError as err:
         raise DocumentError(f"{path}: {err}") from err
+
+
+def find_tree(path: Path) -> LearnedTree | None:
+    """Reads a behavior tree document that may not be there yet; None if it is not.
+
+    Raises:
+        InputError: What is there is no text file, or cannot be read.
+        DocumentError: It is not a valid document.
+    """
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        return None
+    except OSError as err:
+        raise unreadable(path, err) from err
+    if stat.S_ISDIR(mode) or stat.S_ISREG(mode):
+        return read_tree(path)
+    # A pipe would never end.
+    raise InputError(f"{path} is no regular file: remove it.")
 
 
 def write_tree(path: Path, learned: LearnedTree) -> None:
