@@ -439,3 +439,14 @@ def test_missing_files_and_directories_are_refused(tmp_path):
 def test_numpy_numbers_are_written_like_others(tmp_path):
     path = written(tmp_path, [ROWS[0]._replace(state=tuple(np.array([0.5, 0.25])))])
     assert read_recording(path).demonstration.states.tolist() == [[0.5, 0.25]]
+
+
+def test_the_last_action_of_a_first_row_is_read_back(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path, (Feature("x", topic="s", index=0),), ["arm", "base"]) as writer:
+        writer.write(Row(1, "base", "go", "turn", (0.0,)))
+        writer.write(Row(2, "base", "stop", "go", (0.0,)))
+        writer.write(Row(3, "arm", "lift", None, (0.0,)))
+        writer.write(Row(4, "arm", "drop", "lift", (0.0,)))
+    demonstration = read_recording(writer.path).demonstration
+    assert demonstration.before == {"base": "turn"}
+    assert demonstration.actions == ("drop", "go", "lift", "stop")

@@ -15,7 +15,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.validate_topic_name import validate_topic_name
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
 from rebt_ros.demonstration.builder import StateTopic
@@ -24,6 +24,7 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.arrival import ArrivalOrder
+from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.losses import Losses
 from rebt_ros.ros.parameters import Parameters
@@ -82,6 +83,18 @@ class RecorderNode(Node):
             [],
             "Names of the values of state topics, each entry as in 'state:front,left,right'; "
             "where a topic has none, its messages' layout labels name them, else their index.",
+        )()
+        commands = declare.text(
+            "command_topic",
+            "command",
+            "String topic of the executor's commands, as a correction knows what they did before "
+            "it (with several action_topics: a topic below it for each); empty for none.",
+        )()
+        driving = declare.text(
+            "driving_topic",
+            "executor/driving",
+            "Bool topic on which the executor says whether it drives: what a person does while it "
+            "drives is a demonstration of its own; empty for none.",
         )()
         directory = declare.directory(
             "demonstrations", "demonstrations", "Directory of the recordings; ~ is your home."
@@ -169,6 +182,7 @@ class RecorderNode(Node):
                 for topic in action_topics
             ),
         ]
+        self._listen_to_executor(commands, driving, action_topics)
         # Of their own, because their answers wait for the messages received before.
         group = MutuallyExclusiveCallbackGroup()
         for name, kind, command in (
@@ -204,6 +218,32 @@ class RecorderNode(Node):
             answer = self._session.stop()
             log = self.get_logger().info if answer.success else self.get_logger().error
             log(answer.message)
+
+    def _listen_to_executor(self, commands: str, driving: str, channels: Sequence[str]) -> None:
+        """Subscribes to what tells demonstrations and corrections apart."""
+        shown = {self.resolve_topic_name(channel) for channel in channels}
+        for channel in channels if commands else ():
+            topic = topic_of(commands, channel, channels)
+            # A robot that was told to learn from itself is not corrected by itself.
+            if self.resolve_topic_name(topic) not in shown:
+                take = partial(self._on_command, channel)
+                self._sources.append(
+                    self.create_subscription(String, topic, take, QoSProfile(depth=_QUEUE))
+                )
+        if driving:
+            self._sources.append(
+                self.create_subscription(Bool, driving, partial(self._on_driving), DRIVING_QOS)
+            )
+
+    def _on_command(self, channel: str, message: String, info: dict[str, Any]) -> None:
+        received = _received(info)
+        stamp = self._stamp(received)
+        self._queue(received, partial(self._session.command, stamp, channel, message.data))
+
+    def _on_driving(self, message: Bool, info: dict[str, Any]) -> None:
+        received = _received(info)
+        stamp = self._stamp(received)
+        self._queue(received, partial(self._session.drive, stamp, message.data))
 
     def _check_names(self, topics: Sequence[str]) -> None:
         for topic in topics:
@@ -308,6 +348,7 @@ class RecorderNode(Node):
         values: dict[str, object] = {
             "rows": session.rows,
             "rows lost": session.lost,
+            "takeovers": session.takeovers,
             "messages": self._messages,
             "messages lost": self._lost,
             "demonstration": session.writer.path if session.writer else "none yet",

@@ -253,7 +253,7 @@ def is_recording(path: Path) -> bool:
 def read_recording(path: Path) -> Read:
     """Reads a recording, finished or not, of any version so far.
 
-    LAT is not read back, because it follows from the actions.
+    Of LAT only that of the first row is read back: the others follow from the actions.
 
     Raises:
         InputError: The file cannot be read, is no recording, or is damaged.

@@ -183,6 +183,7 @@ class _Columns:
         self._rows = 0
         self._labels: list[bytearray] = []
         self._goes_on = False
+        self._before: dict[int, int] = {}
 
     def add(self, records: Records) -> None:
         """Takes records whose checksums are right."""
@@ -200,6 +201,10 @@ class _Columns:
         self._stamps[part] = records["stamp"]
         self._actions[part] = records["action"]
         self._channel[part] = records["channel"]
+        if len(self._before) < len(self._head.channels):
+            channels, first = np.unique(records["channel"], return_index=True)
+            for channel, last in zip(channels, records["last_action"][first], strict=True):
+                self._before.setdefault(int(channel), int(last))
         states = self._states[part]
         states[...] = records["state"]
         # Also false where there is a NaN.
@@ -215,6 +220,8 @@ class _Columns:
         labels = self._decoded()
         if actions.size and not (actions.min() >= 0 and actions.max() < len(labels)):
             raise self._wrong("an action has no label")
+        if max(self._before.values(), default=0) > len(labels):
+            raise self._wrong("a last action has no label")
         return Demonstration(
             self._path.name,
             self._head.features,
@@ -222,6 +229,11 @@ class _Columns:
             self._stamps[rows],
             *_occurring(labels, actions),
             *_occurring(self._head.channels, self._channel[rows]),
+            {
+                self._head.channels[channel]: labels[last - 1]
+                for channel, last in self._before.items()
+                if last
+            },
         )
 
     def _add_label(self, number: int, content: bytes, size: int) -> None:
