@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench-reduction bench-recorder fuzz soak lint format clean
+.PHONY: help setup build demo test bench-reduction experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -48,6 +48,9 @@ test: build ## Run the tests on the built package.
 bench-reduction: setup ## Compare the sizes of BT-Espresso's trees and ours (ARGS="..." for options).
 	@$(VENV_PYTHON) -m rebt_ros.commands.bench_reduction ../shared/experiments $(ARGS)
 
+experiment: setup ## Reproduce the paper's experiments on ../shared/experiments (ARGS="..." for options).
+	@$(VENV_PYTHON) -m rebt_ros.commands.experiment ../shared/experiments $(ARGS)
+
 # Sizes are multiplied by SCALE; a SEED makes the same inputs again.
 fuzz: SCALE ?= 1
 fuzz: SEED ?=
@@ -63,10 +66,6 @@ soak: setup ## Run the nodes under load and random faults; nothing may get lost 
 	@PYTHONPATH=test:. $(VENV_PYTHON) -m soak --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) \
 	    --output bench-results/soak.json $(ARGS)
 
-bench-recorder: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
-bench-recorder: setup ## Kill, load and measure the recorder (KILLS=50; ARGS="..." for options).
-	@PYTHONPATH=.:test:$$PYTHONPATH $(VENV_PYTHON) test/benchmarks/recorder.py --kills $(or $(KILLS),50) $(ARGS)
-
 lint: setup ## Check style, formatting and types.
 	@status=0; \
 	$(VENV_PYTHON) -m ruff check $(SOURCES) || status=$$?; \
@@ -79,5 +78,5 @@ format: setup ## Format the code and sort its imports.
 	@$(VENV_PYTHON) -m ruff format $(SOURCES)
 
 clean: ## Remove what was built (not .venv).
-	rm -rf build install log demo-results bench-results .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf build install log demo-results bench-results experiment-results .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find rebt_ros test -name __pycache__ -prune -exec rm -rf {} +

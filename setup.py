@@ -66,6 +66,7 @@ setup(
         "scipy>=1.11",
     ],
     extras_require={
+        "cluster": ["distributed>=2023.5", "joblib>=1.4"],
         "pictures": ["matplotlib>=3.6"],
         "test": ["hypothesis", "jsonschema>=4.10", "pytest"],
         "upsampling": ["imbalanced-learn>=0.12"],
@@ -74,6 +75,7 @@ setup(
     entry_points={
         "console_scripts": [
             f"demo = {PACKAGE}.commands.demo:main",
+            f"experiment = {PACKAGE}.commands.experiment:main",
             f"generate = {PACKAGE}.commands.generate:main",
             f"learn = {PACKAGE}.commands.learn:main",
             f"replay = {PACKAGE}.commands.replay:main",

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
-import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -35,6 +33,7 @@ from rebt_ros.selection import JudgedLevels
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.inputs import InputOptions, load
 from rebt_ros.storage.tree_file import read_tree
+from rebt_ros.storage.versions import versions
 
 #: So many different ones can be actions even where each was shown once or twice.
 _FEW_ACTIONS = 20
@@ -260,11 +259,5 @@ def _levels(levels: JudgedLevels | None) -> Iterator[dict[str, float]]:
 
 
 def _versions(options: LearnOptions) -> dict[str, str]:
-    versions = {"python": platform.python_version()}
     further = () if options.upsample is Upsampling.NONE else ("imbalanced-learn",)
-    for package in (*_DECIDING_PACKAGES, *further):
-        try:
-            versions[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            versions[package] = "unknown"
-    return versions
+    return versions((*_DECIDING_PACKAGES, *further))

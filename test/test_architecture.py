@@ -29,6 +29,7 @@ LAYERS: Final = (
     {PACKAGE},  # rebt_ros/__init__.py, the public interface
     {"offline"},
     {"family"},
+    {"experiment"},
     {"pipeline", "replay"},
     {"choosing", "suggesting"},
     {"selection", "options"},
@@ -65,9 +66,10 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 #: Libraries with a home: the only modules that import them.
 HOMES: Final = {
     "apsw": ("rebt_ros.storage.bag_safety",),
+    "distributed": ("rebt_ros.experiment.workers",),
     "imblearn": ("rebt_ros.decision_tree.upsampling",),
     "jsonschema": (),
-    "joblib": ("rebt_ros.commands.bench_*",),
+    "joblib": ("rebt_ros.commands.bench_*", "rebt_ros.experiment.workers"),
     "matplotlib": ("rebt_ros.pictures.*",),
     "networkx": ("rebt_ros.algorithms.lat_*", "rebt_ros.edit_distance.networkx_worker"),
     "py_trees": (
@@ -259,7 +261,7 @@ def test_the_core_runs_where_ros_is_not_installed() -> None:
     _run(f"{WITHOUT_ROS} [importlib.import_module(name) for name in {names}]")
 
 
-@pytest.mark.parametrize("command", ["generate", "learn", "replay", "simulate"])
+@pytest.mark.parametrize("command", ["experiment", "generate", "learn", "replay", "simulate"])
 def test_offline_commands_need_no_ros(command: str) -> None:
     _run(f"{WITHOUT_ROS} importlib.import_module('rebt_ros.commands.{command}')")
 
@@ -267,5 +269,5 @@ def test_offline_commands_need_no_ros(command: str) -> None:
 @pytest.mark.parametrize("node", ["recorder_node", "executor_node"])
 def test_nodes_of_the_robot_load_nothing_that_only_learning_needs(node: str) -> None:
     loaded = _run(f"import sys, rebt_ros.ros.{node}; print(*sys.modules)").split()
-    heavy = {"imblearn", "jsonschema", "pyeda", "rosbags", "scipy", "sklearn"}
+    heavy = {"distributed", "imblearn", "jsonschema", "pyeda", "rosbags", "scipy", "sklearn"}
     assert heavy & {name.split(".")[0] for name in loaded} == set()

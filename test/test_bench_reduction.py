@@ -9,6 +9,7 @@ import pytest
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands import bench_reduction
+from rebt_ros.experiment.configurations import read_configs
 
 CHOICE = {
     "name": "root",
@@ -57,7 +58,7 @@ def test_the_figures_are_printed_and_written(
 
 
 def test_configurations_stand_in_the_order_of_their_numbers(experiments: Path) -> None:
-    names = [config.name for config in bench_reduction.read_configs(experiments)]
+    names = [config.name for config in read_configs(experiments)]
     assert names == ["expr9", "expr10"]
 
 
@@ -66,7 +67,7 @@ def test_a_tree_that_differs_from_the_decision_tree_is_counted_as_mismatches(
 ) -> None:
     always_go = nodes.Action("go", "action")
     monkeypatch.setitem(bench_reduction._MODES, "paper", lambda tree: always_go)
-    (config, _) = bench_reduction.read_configs(experiments)
+    (config, _) = read_configs(experiments)
     result = bench_reduction.compare(config, ticks=300, seed=0)
     assert all(one.mismatches == 0 for one in result.comparisons["default"])
     assert all(0 < one.mismatches < result.rows for one in result.comparisons["paper"])

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import joblib
@@ -30,13 +28,12 @@ from rebt_ros.decision_tree.tree import DecisionTree, Leaf
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.evaluation import teacher_forced_choices
-from rebt_ros.simulation.experiment_config import ExperimentConfig, parse_config
+from rebt_ros.experiment.configurations import read_configs
+from rebt_ros.experiment.reduction import Reductions, Size, SizeComparison
+from rebt_ros.experiment.settings import MAX_DEPTH
+from rebt_ros.simulation.experiment_config import ExperimentConfig
 from rebt_ros.simulation.experiment_robot import TICKS, ExperimentRobot, simulate
 from rebt_ros.storage.atomic import write_text_atomically
-from rebt_ros.storage.text import read_text
-
-#: The paper's depth of decision trees (IV-B).
-_MAX_DEPTH = 5
 
 _MODES: dict[str, Callable[[DecisionTree], nodes.Node]] = {
     "paper": lambda tree: re_bt_espresso(tree, delta=0.0),
@@ -45,39 +42,11 @@ _MODES: dict[str, Callable[[DecisionTree], nodes.Node]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Size:
-    """Number of nodes of a tree."""
+class Comparison(SizeComparison):
+    """The sizes, and whether the mode's tree still does the same."""
 
-    emitted: int
-    without_inverters: int
-
-    @classmethod
-    def of(cls, tree: nodes.Node) -> Size:
-        """The size of a tree."""
-        inverters = sum(isinstance(node, nodes.Inverter) for node in nodes.walk(tree))
-        emitted = nodes.size(tree)
-        return cls(emitted, emitted - inverters)
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """One decision tree, converted by BT-Espresso and by one mode."""
-
-    baseline: Size
-    size: Size
     mismatches: int
     """Rows on which the mode's tree and the decision tree differ."""
-
-    @property
-    def reduction(self) -> float:
-        """Per cent of the baseline's nodes that are gone, Inverters left out on both sides."""
-        before = self.baseline.without_inverters
-        return 100 * (before - self.size.without_inverters) / before
-
-    @property
-    def reduction_as_emitted(self) -> float:
-        """The same, with Inverters."""
-        return 100 * (self.baseline.emitted - self.size.emitted) / self.baseline.emitted
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +112,7 @@ def _bench(parsed: argparse.Namespace) -> None:
     }
     rows = sum(result.rows for result in results)
     undecided = sum(result.undecided for result in results)
-    settings: dict[str, Any] = {"ticks": parsed.ticks, "seed": parsed.seed, "max_depth": _MAX_DEPTH}
+    settings: dict[str, Any] = {"ticks": parsed.ticks, "seed": parsed.seed, "max_depth": MAX_DEPTH}
     work: dict[str, Any] = {
         "configurations": len(configs),
         "rows": rows,
@@ -164,30 +133,6 @@ def _bench(parsed: argparse.Namespace) -> None:
     )
 
 
-def read_configs(directory: Path) -> list[ExperimentConfig]:
-    """The configurations of a directory, in the order of the numbers in their names.
-
-    Raises:
-        InputError: There are none, or one is malformed.
-    """
-    paths = sorted(directory.glob("*.json"), key=lambda path: _by_number(path.stem))
-    if not paths:
-        raise InputError(f"{directory} has no configuration files: name a directory of *.json.")
-    return [parse_config(read_text(path), path.stem) for path in paths]
-
-
-def _by_number(name: str) -> list[tuple[str, int]]:
-    """Sorts names by the numbers in them.
-
-    >>> sorted(["expr10", "expr9"], key=_by_number)
-    ['expr9', 'expr10']
-    """
-    parts = re.split(r"([0-9]+)", name)
-    return [
-        (text, int(number)) for text, number in zip(parts[::2], [*parts[1::2], "0"], strict=True)
-    ]
-
-
 def compare(config: ExperimentConfig, ticks: int, seed: int) -> ConfigurationResult:
     """Simulates one configuration and compares the trees of all its pruning levels.
 
@@ -199,7 +144,7 @@ def compare(config: ExperimentConfig, ticks: int, seed: int) -> ConfigurationRes
     if not len(demonstration):
         return ConfigurationResult(0, comparisons, 0)
     (table,) = tabulate([demonstration])
-    fitted = fit(table, last_action=True, max_depth=_MAX_DEPTH)
+    fitted = fit(table, last_action=True, max_depth=MAX_DEPTH)
     undecided = 0
     for alpha in fitted.path.alphas:
         trained = fitted.at(float(alpha))
@@ -215,27 +160,6 @@ def compare(config: ExperimentConfig, ticks: int, seed: int) -> ConfigurationRes
             mismatches = int(np.sum(teacher_forced_choices(tree, table) != predicted))
             comparisons[mode].append(Comparison(baseline, Size.of(tree), mismatches))
     return ConfigurationResult(len(table), comparisons, undecided)
-
-
-@dataclass(frozen=True, slots=True)
-class Reductions:
-    """How the relative reductions of many trees are distributed, in per cent."""
-
-    median: float
-    maximum: float
-    share_reduced: float
-    """Trees that got smaller at all."""
-
-    @classmethod
-    def of(cls, reductions: Sequence[float]) -> Reductions:
-        """The distribution of at least one reduction."""
-        reduced = sum(reduction > 0 for reduction in reductions)
-        share = 100 * reduced / len(reductions)
-        return cls(round(median(reductions), 2), round(max(reductions), 2), round(share, 2))
-
-    def cells(self) -> tuple[str, str, str]:
-        """For a table."""
-        return f"{self.median:.2f} %", f"{self.maximum:.2f} %", f"{self.share_reduced:.2f} %"
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,8 +27,11 @@ from soak.robot import BLOCK, LABELS
 #: How long something that must happen may take before it counts as a loss (seconds).
 _PATIENCE: Final = 60.0
 
-#: How long a command that was sent before an answer may be under way after it (seconds).
-_UNDER_WAY: Final = 0.5
+#: How much later than an answer was received it may have been sent (seconds).
+_ANSWERED: Final = 0.1
+
+#: How long a message may be under way where one was lost and is sent again (seconds).
+_UNDER_WAY: Final = 10.0
 
 #: Pause for discovery after a start, so that no command is sent before the robot can hear it.
 _DISCOVERY: Final = 2.0
@@ -78,6 +81,9 @@ class Soak:
         self._marks: tuple[int, int] | None = None
         """Commands heard and sent when the executor rested last, in the same life."""
         self._disabled_since: float | None = None
+        # What the recorder has said last.
+        self._late = 0
+        self._recorded = Path()
         peer.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_report, 10)
         peer.node.create_subscription(String, "behavior_tree", self._on_tree, LATCHED)
         self._next_watch = 0.0
@@ -173,8 +179,13 @@ class Soak:
             if status.name == "recorder: recording":
                 values = values_of(status)
                 rows = int(values["rows of the demonstration"])
+                path = Path(values["demonstration"]).resolve()
                 if rows:
-                    self.ledger.acknowledge(Path(values["demonstration"]).resolve(), rows)
+                    self.ledger.acknowledge(path, rows)
+                late = int(values.get("late action", 0))
+                if late > self._late:
+                    self.ledger.late |= {path, self._recorded}
+                self._late, self._recorded = late, path
             elif status.name == "executor: execution":
                 longest = float(values_of(status)["longest tick (ms)"])
                 self.ledger.raise_to("longest_tick_ms", longest)
@@ -209,7 +220,7 @@ class Soak:
         if name == "executor":
             self._listen()
             # Whatever comes from its next life before it is enabled is a loss.
-            self._disabled_since = self._disabled_since or time.monotonic()
+            self._disabled_since = self._disabled_since or time.time()
             self._marks = None
         if name == "learner":
             self._published.clear()
@@ -239,31 +250,31 @@ class Soak:
 
     def enable(self, data: bool) -> None:
         """Enables or disables; what it commands meanwhile is judged later."""
-        began = time.monotonic()
+        began = time.time()
         if data:
             self._listen(until=began)
             self._disabled_since = None
         self.answer("/executor/enable", data)
         if not data:
-            self._disabled_since = time.monotonic()
+            self._disabled_since = time.time()
 
     def audit_commands(self) -> None:
         """Disables, and compares what was sent with what was heard and ticked."""
         if self._disabled_since is None:
             self.enable(False)
-        before, self._marks = self._marks, self._resting()
+        before = self._marks
+        self._marks = self._resting()
         if before is not None and self._marks is not None:
             heard, sent = (after - one for after, one in zip(self._marks, before, strict=True))
             if heard != sent:
                 kind = "missed commands" if heard < sent else "doubled commands"
                 self.ledger.lose(kind, f"{heard} heard of {sent} sent", abs(heard - sent))
-        self.wait(_UNDER_WAY)
         self.enable(True)
         self.expect_condition("running")
 
     def _resting(self) -> tuple[int, int] | None:
         """Commands heard and sent, while it is disabled."""
-        self.wait(_UNDER_WAY)
+        self.wait(_ANSWERED)
         status = self.status("executor")
         if status is None:
             return None
@@ -272,7 +283,15 @@ class Soak:
             self.ledger.lose(
                 "missed commands", f"{values['ticks']} ticks, {values['commands']} commands"
             )
-        return self.robot.listen(), int(values["commands"])
+        sent = int(values["commands"])
+        if self._marks is not None:
+            wanted = self._marks[0] + sent - self._marks[1]
+            end = time.monotonic() + _UNDER_WAY
+            while self.robot.listen() < wanted and time.monotonic() < end:
+                self._meanwhile()
+            # One more than was sent would come now.
+            self.wait(_ANSWERED)
+        return self.robot.listen(), sent
 
     def _listen(self, until: float | None = None) -> None:
         """Judges what the robot has heard since it was judged last."""

@@ -6,6 +6,7 @@ import math
 import os
 import resource
 import signal
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from random import Random
@@ -160,10 +161,12 @@ def stale_state(soak: Soak, random: Random) -> str:
     """The robot falls silent: the executor waits, and goes on by itself."""
     soak.robot.tell("pause")
     soak.expect_condition("waiting for state")
-    heard = soak.robot.listen()
+    since = time.time()
     soak.wait(random.uniform(0.5, 1.5))
-    if soak.robot.listen() > heard:
-        soak.ledger.lose("commands on stale state", f"{soak.robot.listen() - heard}")
+    soak.robot.listen()
+    count = sum(sent > since for sent, _ in soak.robot.commands)
+    if count:
+        soak.ledger.lose("commands on stale state", str(count), count)
     soak.robot.tell("resume")
     soak.expect_condition("running")
     return "stale state"

@@ -165,7 +165,7 @@ class RobotProcess:
         self._log.touch()
         self._read = 0
         self.commands: list[tuple[float, str]] = []
-        """When each was heard (monotonic seconds), and its label."""
+        """When each was sent (seconds, as `time.time` has it), and its label."""
         paths = [str(CHECKOUT / "test"), str(CHECKOUT), os.environ.get("PYTHONPATH", "")]
         self._process = subprocess.Popen(
             [sys.executable, "-m", "soak.robot", str(self._log), str(rate)],

@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -70,8 +70,9 @@ class Robot(Node):
             self.actions += 1
         self.states += 1
 
-    def _on_command(self, message: String) -> None:
-        self._log.write(f"{time.monotonic():.6f} {message.data}\n")
+    def _on_command(self, message: String, info: dict[str, Any]) -> None:
+        # When it was sent: the middleware may deliver it later.
+        self._log.write(f"{info['source_timestamp'] / 1e9:.6f} {message.data}\n")
 
 
 def _run(robot: Robot, rate: float, ended: threading.Event) -> None:
