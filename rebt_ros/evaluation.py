@@ -52,7 +52,7 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
     chosen = np.full(len(table), NO_ACTION, dtype=np.int64)
     recent: tuple[str, ...] = ()
     for row, starts in enumerate(_starts(table)):
-        recent = () if starts else recent
+        recent = _recent_at(row, table) if starts else recent
         if recent not in choices:
             choices[recent] = _choices_after(recent, tree, table)
         choice = int(choices[recent][row])
@@ -73,6 +73,12 @@ def _choices_after(
     history = ActionHistory(reversed(recent))
     states = States(table.features, table.states, last_action_of(history))
     return choose(tree, actions_of(table), states)
+
+
+def _recent_at(row: int, table: DemonstrationTable) -> tuple[str, ...]:
+    """What is known to have been done before the first row of a demonstration."""
+    code = NO_ACTION if table.before is None else int(table.before[table.demonstration[row]])
+    return () if code == NO_ACTION else (table.actions[code],)
 
 
 def _after(recent: tuple[str, ...], action: str, reach: int) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from rebt_ros.behavior_tree.learned_tree import (
     Provenance,
 )
 from rebt_ros.choosing import Policy, choose, convert
+from rebt_ros.decision_tree.shown_rows import shown_rows
 from rebt_ros.decision_tree.training import TrainedTree, train
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.lags import evenly_spaced, with_lags
@@ -139,6 +140,7 @@ def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
             for channel, one in zip(channels, trees, strict=True)
             for suggestion in one.suggestions
         ),
+        tuple(channel for one in trees for channel in one.shown),
     )
 
 
@@ -205,9 +207,10 @@ def learn_from(
         notes = (*notes, _UNEVEN.format(table.channel))
     tree, suggestions = accept(tree, suggestions, options)
     learned = as_learned(table, trained, tree, policy.ccp_alpha, figures, options)
+    ranges = shown_rows(learned_from, trained)
     progress("done", 1.0)
     return Learning(
-        replace(learned, suggestions=suggestions),
+        replace(learned, suggestions=suggestions, shown=(ranges,)),
         trained,
         table,
         held_out,

@@ -1,8 +1,16 @@
-"""Settings of every test."""
+"""Settings of every test, and the fixtures of those that use DDS."""
+
+from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
+import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from ros_processes import Peer
 
 # No test hears, or is heard by, another machine.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -10,3 +18,22 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 # A slow machine is no failure, and the first example pays for imports.
 settings.register_profile("rebt_ros", deadline=None)
 settings.load_profile("rebt_ros")
+
+
+# Their imports wait, because the tests of the core run without ROS.
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A ROS domain of the test's own."""
+    from ros_processes import own_domain
+
+    with own_domain() as number:
+        yield number
+
+
+@pytest.fixture
+def peer(domain: int) -> Iterator[Peer]:
+    """A node of the test in its domain."""
+    from ros_processes import Peer
+
+    with Peer(domain) as one:
+        yield one

@@ -23,6 +23,7 @@ from rebt_ros.behavior_tree.learned_tree import (
     Suggestion,
     SuggestionKind,
 )
+from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
 from rebt_ros.demonstration.schema import LARGEST_LAG, Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import (
@@ -374,10 +375,26 @@ def learned_trees(draw: st.DrawFn) -> LearnedTree:
         trees(leaves, max_leaves=3),
         st.booleans(),
     )
+    shown = st.builds(ShownChannel, names, st.lists(_shown_leaves(declared), max_size=2).map(tuple))
     return LearnedTree(
         declared,
         tuple(actions),
         draw(trees(leaves, max_leaves=8)),
         draw(provenances),
         tuple(draw(st.lists(suggestions, max_size=2))),
+        tuple(draw(st.lists(shown, max_size=2))),
     )
+
+
+def _shown_leaves(declared: Sequence[Feature]) -> st.SearchStrategy[ShownLeaf]:
+    spans = st.lists(finite, min_size=2, max_size=2).map(lambda ends: Span(*sorted(ends)))
+    values = [
+        st.none()
+        | (
+            st.lists(st.sampled_from(one.categories), min_size=1, unique=True).map(tuple)
+            if one.categories
+            else spans
+        )
+        for one in declared
+    ]
+    return st.builds(ShownLeaf, st.integers(0, 10**6), st.tuples(*values))

@@ -6,6 +6,7 @@ import copy
 import json
 import struct
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -23,6 +24,7 @@ from rebt_ros.behavior_tree.document import (
     loads,
 )
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, SuggestionKind
+from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
 from rebt_ros.errors import DocumentError
 from rebt_ros.logic.conditions import (
     HasCategory,
@@ -57,6 +59,12 @@ FULL = LearnedTree(
     EVERY_NODE,
     some.PROVENANCE,
     (Suggestion("psa-1", SuggestionKind.PSA, 3, EVERY_NODE.children[3], attached=True),),
+    (
+        ShownChannel(
+            some.CHANNEL,
+            (ShownLeaf(7, (Span(0.1, 0.1 + 0.2), None, Span(0.0, 1.0), ("cup",))),),
+        ),
+    ),
 )
 
 
@@ -130,7 +138,7 @@ def test_the_schema_is_one() -> None:
 
 def test_numbers_may_be_written_with_or_without_a_fraction() -> None:
     changed = document()
-    changed["version"] = 1.0
+    changed["version"] = 2.0
     changed["provenance"]["rows"] = 7.0
     changed["provenance"]["delta"] = 1
     changed["tree"]["children"][0]["children"][0]["test"]["at_most"] = 3
@@ -139,6 +147,14 @@ def test_numbers_may_be_written_with_or_without_a_fraction() -> None:
     assert loaded.provenance.rows == 7
     assert type(loaded.provenance.rows) is int
     assert type(loaded.provenance.delta) is float
+
+
+def test_a_document_of_version_1_is_read_and_says_nothing_of_what_was_shown() -> None:
+    old = document()
+    old["version"] = 1
+    del old["shown"]
+    assert SCHEMA.is_valid(old)
+    assert loads(json.dumps(old)) == replace(FULL, shown=())
 
 
 # --- the schema and the reader agree ----------------------------------------------------------
@@ -152,6 +168,9 @@ EXTRA_RULES = (
     "whole characters",
     "finite number",
     "must not be empty",
+    "a leaf has the values of",
+    "cannot be",
+    "does not have all categories",
 )
 
 
@@ -246,7 +265,33 @@ Change = Callable[[dict[str, Any]], object]
         (lambda d: d.update(extra=1), "document has the unknown field 'extra'."),
         (lambda d: d.pop("format"), "does not say that its format is 'rebt_ros/behavior_tree'"),
         (lambda d: d.update(format="bt"), "does not say that its format is"),
-        (lambda d: d.update(version=2), "version 2: this release of rebt_ros reads version 1"),
+        (lambda d: d.update(version=3), "version 3: this release of rebt_ros reads the versions 1"),
+        (lambda d: d.update(version=1), "unknown field 'shown'"),
+        (lambda d: d.pop("shown"), "document lacks 'shown'."),
+        (
+            lambda d: d["shown"][0]["leaves"][0]["values"].pop(),
+            "a leaf has the values of 3 of 4 features",
+        ),
+        (
+            lambda d: d["shown"][0]["leaves"][0]["values"].__setitem__(0, [2, 1]),
+            "'distance' cannot be 2 to 1",
+        ),
+        (
+            lambda d: d["shown"][0]["leaves"][0]["values"].__setitem__(3, [0, 1]),
+            "'kind' cannot be 0 to 1",
+        ),
+        (
+            lambda d: d["shown"][0]["leaves"][0]["values"].__setitem__(0, ["cup"]),
+            "'distance' does not have all categories",
+        ),
+        (
+            lambda d: d["shown"][0]["leaves"][0]["values"].__setitem__(0, [1, 2, 3]),
+            "document.shown[0].leaves[0].values[0] must be null, two numbers or categories",
+        ),
+        (
+            lambda d: d["shown"][0].update(leaves=d["shown"][0]["leaves"] * 251),
+            "must be an array of at most 250 elements",
+        ),
         (lambda d: d.update(version=True), "version True"),
         (lambda d: d.update(version="1"), "version '1'"),
         (lambda d: d.pop("version"), "version None"),
@@ -394,7 +439,7 @@ def with_value(name: str, value: str) -> str:
     return json.dumps(changed).replace('"@@"', value)
 
 
-FIELDS = ("format", "version", "features", "actions", "tree", "suggestions", "provenance")
+FIELDS = ("format", "version", "features", "actions", "tree", "suggestions", "provenance", "shown")
 
 
 @pytest.mark.parametrize("name", FIELDS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import strategies as some
@@ -152,3 +154,12 @@ def test_no_rows_give_no_choices() -> None:
     for tree in (GO, COPYCAT):
         assert own_history_choices(tree, nothing).tolist() == []
         assert teacher_forced_choices(tree, nothing).tolist() == []
+
+
+def test_a_correction_is_judged_with_what_the_robot_did_before_it() -> None:
+    after_turn = nodes.Condition(Literal(LastActionIs("turn", ("go",))))
+    tree = nodes.Selector((nodes.Sequence((after_turn, GO)), WAIT))
+    shown = some.table([(0.0, 0.0, 0.0, 0.0)] * 2, [0, 0])
+    assert own_history_choices(tree, shown).tolist() == [3, 3]
+    corrected = replace(shown, before=np.array([2]))
+    assert own_history_choices(tree, corrected).tolist() == [0, 0]

@@ -4,105 +4,28 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 pytest.importorskip("rclpy")
 
-from ros_processes import LATCHED, NodeProcess, Peer, own_domain, values_of
+from executor_examples import GO, STOP, TURN, Robot, learned, publish, status, where_x_is_small
+from ros_processes import NodeProcess, Peer, values_of
 from std_msgs.msg import String
 
 from rebt_ros.behavior_tree.document import dumps
-from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
 from rebt_ros.behavior_tree.nodes import (
     Action,
     Condition,
-    Node,
     Parallel,
     Selector,
     Sequence,
-    actions,
 )
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import LastActionIs, Literal, Threshold
 from rebt_ros.storage.tree_file import write_tree
-
-GO, TURN, STOP = (Action(label, "action") for label in ("go", "turn", "stop"))
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    with own_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def peer(domain: int) -> Iterator[Peer]:
-    with Peer(domain) as one:
-        yield one
-
-
-def _learned(tree: Node, topic: str | None = "state") -> LearnedTree:
-    """Features y and x; y, the first value of the state, is never tested."""
-    return LearnedTree(
-        tuple(
-            Feature(name, topic=topic, index=None if topic is None else index)
-            for index, name in enumerate(("y", "x"))
-        ),
-        actions(tree),
-        tree,
-        Provenance(1, 10, 0.0, 5, 0.0, Root.SELECTOR, False, Figures(0, 1.0, 1.0, 2)),
-    )
-
-
-def _where_x_is_small(small: Action, otherwise: Action) -> Node:
-    return Selector((Sequence((Condition(Literal(Threshold("x", 0.5))), small)), otherwise))
-
-
-def _status(peer: Peer, condition: str, **values: str) -> Any:
-    """Waits until the executor reports a condition."""
-
-    def reported() -> Any:
-        status = peer.diagnostics.get("executor: execution")
-        if status is None or values_of(status)["condition"] != condition:
-            return None
-        found = values_of(status)
-        keys = {key.replace("_", " "): value for key, value in values.items()}
-        return status if all(found.get(key) == value for key, value in keys.items()) else None
-
-    return peer.wait_until(reported, what=f"the condition {condition!r}")
-
-
-class Robot:
-    """Publishes a state all the time and hears the commands."""
-
-    def __init__(self, peer: Peer) -> None:
-        self._peer = peer
-        self.state = (7.0, 0.0)
-        self.commands = peer.listen(String, "command")
-
-    def until(self, condition: Any, what: str = "") -> Any:
-        def published() -> Any:
-            self._peer.state(*self.state)
-            return condition()
-
-        return self._peer.wait_until(published, what=what)
-
-    def obeys(self, label: str) -> None:
-        """Waits for a command that is sent from now on."""
-        seen = len(self.commands)
-        self.until(
-            lambda: any(one.data == label for one in self.commands[seen:]), f"command {label!r}"
-        )
-
-
-def _publish(peer: Peer, learned: LearnedTree | str) -> None:
-    document = learned if isinstance(learned, str) else dumps(learned)
-    peer.connect(String, "behavior_tree", LATCHED).publish(String(data=document))
 
 
 def test_it_waits_for_a_tree_then_to_be_enabled_then_for_state(
@@ -110,15 +33,15 @@ def test_it_waits_for_a_tree_then_to_be_enabled_then_for_state(
 ) -> None:
     with NodeProcess("executor_node", domain, tmp_path) as executor:
         robot_hears = peer.listen(String, "command")
-        _status(peer, "waiting for a tree", enabled="False")
-        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
-        status = _status(peer, "disabled")
-        assert values_of(status)["nodes"] == "5"
+        status(peer, "waiting for a tree", enabled="False")
+        publish(peer, learned(where_x_is_small(GO, TURN)))
+        said = status(peer, "disabled")
+        assert values_of(said)["nodes"] == "5"
         answer = peer.call("/executor/enable", True)
         assert answer.success
         assert "waiting for state: state (never received)" in answer.message
-        status = _status(peer, "waiting for state")
-        assert int.from_bytes(status.level, "big") == 1
+        said = status(peer, "waiting for state")
+        assert int.from_bytes(said.level, "big") == 1
         assert robot_hears == []
         robot = Robot(peer)
         robot.obeys("go")
@@ -131,14 +54,14 @@ def test_it_waits_for_a_tree_then_to_be_enabled_then_for_state(
 def test_a_stale_state_halts_the_tree_and_a_fresh_one_resumes(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    write_tree(tmp_path / "tree.json", _learned(_where_x_is_small(GO, TURN)))
+    write_tree(tmp_path / "tree.json", learned(where_x_is_small(GO, TURN)))
     parameters = {"tree_file": tmp_path / "tree.json", "enabled": True, "state_timeout": 0.2}
     with NodeProcess("executor_node", domain, tmp_path, parameters):
         robot = Robot(peer)
         robot.obeys("go")
-        _status(peer, "waiting for state")
+        status(peer, "waiting for state")
         silent = len(robot.commands)
-        _status(peer, "waiting for state")
+        status(peer, "waiting for state")
         assert len(robot.commands) == silent
         robot.obeys("go")
 
@@ -148,7 +71,7 @@ def test_no_command_follows_the_answer_to_a_disabling_call(
 ) -> None:
     parameters = {"enabled": True, "rate": 200.0}
     with NodeProcess("executor_node", domain, tmp_path, parameters):
-        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        publish(peer, learned(where_x_is_small(GO, TURN)))
         robot = Robot(peer)
         robot.obeys("go")
         call = peer.begin("/executor/enable", False)
@@ -168,21 +91,21 @@ def test_no_command_follows_the_answer_to_a_disabling_call(
 
 def test_a_refused_document_keeps_the_tree_running(domain: int, peer: Peer, tmp_path: Path) -> None:
     with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}) as executor:
-        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        publish(peer, learned(where_x_is_small(GO, TURN)))
         robot = Robot(peer)
         robot.obeys("go")
         wave = Action("wave", "arm")
-        bad_name = _learned(_where_x_is_small(TURN, GO), topic="no topic")
+        bad_name = learned(where_x_is_small(TURN, GO), topic="no topic")
         refused = [
             "{",
             "[]",
-            dumps(_learned(_where_x_is_small(TURN, GO))).replace("0.5", "NaN"),
-            dumps(_learned(_where_x_is_small(TURN, GO))).replace('"x"', '"z"', 1),
-            dumps(_learned(_where_x_is_small(wave, GO))),
+            dumps(learned(where_x_is_small(TURN, GO))).replace("0.5", "NaN"),
+            dumps(learned(where_x_is_small(TURN, GO))).replace('"x"', '"z"', 1),
+            dumps(learned(where_x_is_small(wave, GO))),
             dumps(bad_name),
         ]
         for count, document in enumerate(refused, 1):
-            _publish(peer, document)
+            publish(peer, document)
             robot.until(
                 lambda count=count: (
                     (one := peer.diagnostics.get("executor: execution"))
@@ -193,7 +116,7 @@ def test_a_refused_document_keeps_the_tree_running(domain: int, peer: Peer, tmp_
             robot.obeys("go")
         executor.says("a behavior tree was refused (the tree before it stays)")
         assert {one.data for one in robot.commands} == {"go"}
-        _publish(peer, _learned(_where_x_is_small(STOP, GO)))
+        publish(peer, learned(where_x_is_small(STOP, GO)))
         robot.obeys("stop")
 
 
@@ -201,7 +124,7 @@ def test_bad_state_messages_are_counted_and_let_the_state_go_stale(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
     with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}):
-        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        publish(peer, learned(where_x_is_small(GO, TURN)))
         robot = Robot(peer)
         robot.state = (float("nan"), 0.0)
         robot.obeys("go")  # The tree does not test the first value.
@@ -226,7 +149,7 @@ def test_bad_state_messages_are_counted_and_let_the_state_go_stale(
 def test_commands_on_change_are_sent_once(domain: int, peer: Peer, tmp_path: Path) -> None:
     parameters = {"enabled": True, "publish": "on_change", "rate": 100.0}
     with NodeProcess("executor_node", domain, tmp_path, parameters):
-        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        publish(peer, learned(where_x_is_small(GO, TURN)))
         robot = Robot(peer)
         robot.obeys("go")
         robot.state = (7.0, 1.0)
@@ -245,7 +168,7 @@ def test_an_action_runs_until_its_result_comes(domain: int, peer: Peer, tmp_path
         "rate": 100.0,
     }
     with NodeProcess("executor_node", domain, tmp_path, parameters):
-        _publish(peer, _learned(tree))
+        publish(peer, learned(tree))
         robot = Robot(peer)
         snapshots = peer.listen(String, "/executor/snapshot")
         commands = robot.commands
@@ -265,7 +188,7 @@ def test_an_action_runs_until_its_result_comes(domain: int, peer: Peer, tmp_path
         running("RUNNING", "RUNNING", "RUNNING", "INVALID", "INVALID")
         peer.action("turn:success", topic="result")  # Not what is running.
         peer.action("perhaps", topic="result")
-        _status(peer, "running", unknown_action_result="1")
+        status(peer, "running", unknown_action_result="1")
         assert [one.data for one in commands] == ["go"]
         peer.action("go:success", topic="result")
         sent("go", "turn")
@@ -274,18 +197,18 @@ def test_an_action_runs_until_its_result_comes(domain: int, peer: Peer, tmp_path
         sent("go", "turn", "stop")
         peer.action("success", topic="result")
         sent("go", "turn", "stop", "go")
-        _publish(peer, _learned(_where_x_is_small(TURN, STOP)))
+        publish(peer, learned(where_x_is_small(TURN, STOP)))
         robot.obeys("turn")  # The running action was interrupted.
 
 
 def test_a_swapped_tree_knows_what_was_done_before(domain: int, peer: Peer, tmp_path: Path) -> None:
     after_stop = Condition(Literal(LastActionIs("stop", ("turn",))))
-    second = Selector((Sequence((after_stop, TURN)), _where_x_is_small(GO, STOP)))
+    second = Selector((Sequence((after_stop, TURN)), where_x_is_small(GO, STOP)))
     with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}):
-        _publish(peer, _learned(_where_x_is_small(STOP, GO)))
+        publish(peer, learned(where_x_is_small(STOP, GO)))
         robot = Robot(peer)
         robot.obeys("stop")
-        _publish(peer, _learned(second))
+        publish(peer, learned(second))
         robot.obeys("turn")
         assert "go" not in {one.data for one in robot.commands}
 
@@ -295,14 +218,14 @@ def test_a_tree_looks_back_at_ticks_since_it_was_last_halted_or_swapped(
 ) -> None:
     known_before = Condition(Literal(Threshold("x[t-1]", 1e6)))
     lagged = Feature("x[t-1]", topic="state", index=1, lag=1)
-    learned = replace(
-        _learned(Selector((GO, TURN))),
+    lagging = replace(
+        learned(Selector((GO, TURN))),
         features=(lagged,),
         tree=Selector((Sequence((known_before, GO)), TURN)),
     )
     parameters = {"enabled": True, "publish": "on_change", "rate": 100.0, "state_timeout": 2.0}
     with NodeProcess("executor_node", domain, tmp_path, parameters):
-        _publish(peer, learned)
+        publish(peer, lagging)
         robot = Robot(peer)
 
         def did(times: int) -> None:
@@ -315,15 +238,15 @@ def test_a_tree_looks_back_at_ticks_since_it_was_last_halted_or_swapped(
         did(2)
         # No state for a while.
         peer.diagnostics.clear()
-        _status(peer, "waiting for state")
+        status(peer, "waiting for state")
         did(3)
-        _publish(peer, replace(learned, actions=(*learned.actions, STOP)))
+        publish(peer, replace(lagging, actions=(*lagging.actions, STOP)))
         did(4)
 
 
 def test_snapshots_are_sent_when_something_changed(domain: int, peer: Peer, tmp_path: Path) -> None:
     with NodeProcess("executor_node", domain, tmp_path, {"enabled": True, "rate": 100.0}):
-        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        publish(peer, learned(where_x_is_small(GO, TURN)))
         robot = Robot(peer)
         robot.obeys("go")
         snapshots = peer.listen(String, "/executor/snapshot")
@@ -343,7 +266,7 @@ def test_snapshots_are_sent_when_something_changed(domain: int, peer: Peer, tmp_
 def test_a_tree_from_a_table_reads_the_state_topic_in_its_order(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    write_tree(tmp_path / "tree.json", _learned(_where_x_is_small(GO, TURN), topic=None))
+    write_tree(tmp_path / "tree.json", learned(where_x_is_small(GO, TURN), topic=None))
     parameters = {"tree_file": tmp_path / "tree.json", "enabled": True, "state_topic": "sensors"}
     arguments = ["-r", "sensors:=/state", "-r", "__ns:=/robot", "-r", "command:=/command"]
     with NodeProcess("executor_node", domain, tmp_path, parameters, arguments):
@@ -357,7 +280,7 @@ def test_a_signal_ends_it_quietly_while_it_commands(
     with NodeProcess(
         "executor_node", domain, tmp_path, {"enabled": True, "rate": 1000.0}
     ) as executor:
-        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        publish(peer, learned(where_x_is_small(GO, TURN)))
         Robot(peer).obeys("go")
         assert executor.stop(number) == 0
         assert "Traceback" not in executor.stderr
@@ -386,10 +309,10 @@ def test_channels_are_commanded_side_by_side_each_on_a_topic_of_its_own(
 ) -> None:
     grasp, release = (Action(label, "/arm/action") for label in ("grasp", "release"))
     drive, wait = (Action(label, "base") for label in ("drive", "wait"))
-    tree = Parallel((_where_x_is_small(grasp, release), _where_x_is_small(drive, wait)))
+    tree = Parallel((where_x_is_small(grasp, release), where_x_is_small(drive, wait)))
     with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}):
         robot = Robot(peer)
-        _publish(peer, _learned(tree))
+        publish(peer, learned(tree))
         arm = peer.listen(String, "command/arm/action")
         base = peer.listen(String, "command/base")
         robot.until(lambda: arm and base, "commands on both channels")
@@ -397,5 +320,5 @@ def test_channels_are_commanded_side_by_side_each_on_a_topic_of_its_own(
         robot.state = (7.0, 1.0)
         robot.until(lambda: arm[-1].data == "release" and base[-1].data == "wait")
         # A tree of one channel takes over, on the one topic.
-        _publish(peer, _learned(_where_x_is_small(GO, TURN)))
+        publish(peer, learned(where_x_is_small(GO, TURN)))
         robot.obeys("turn")

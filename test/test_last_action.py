@@ -106,3 +106,16 @@ def test_a_cleared_history_knows_nothing() -> None:
     history = ActionHistory(["go", "turn"])
     history.clear()
     assert history.before() is None
+
+
+def test_a_demonstration_may_begin_with_a_last_action() -> None:
+    actions, demonstrations = np.array([0, 0, 1, 2, 1]), np.array([0, 0, 0, 1, 1])
+    before = np.array([2, NO_ACTION])
+    assert last_actions(actions, demonstrations, before).tolist() == [2, 2, 0, NO_ACTION, 2]
+
+
+def test_a_history_can_be_continued() -> None:
+    history = ActionHistory(["turn", "go", "turn"])
+    assert history.taken == ("go", "turn")
+    assert ActionHistory(history.taken).taken == history.taken
+    assert ActionHistory(history.taken).before("turn") == "go"

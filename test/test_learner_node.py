@@ -7,7 +7,6 @@ import json
 import os
 import resource
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
-from ros_processes import LATCHED, NodeProcess, Peer, own_domain, values_of, wait_until
+from ros_processes import LATCHED, NodeProcess, Peer, values_of, wait_until
 from std_msgs.msg import String
 
 from rebt_ros.behavior_tree.document import loads
@@ -29,18 +28,6 @@ from rebt_ros.storage.recording import RecordingWriter
 from rebt_ros.storage.tree_file import read_tree
 
 FEATURES = (Feature("x", topic="state", index=0), Feature("y", topic="state", index=1))
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    with own_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def peer(domain: int) -> Iterator[Peer]:
-    with Peer(domain) as one:
-        yield one
 
 
 def _record(directory: Path, rows: int = 60, actions: tuple[str, ...] = ("go", "turn")) -> None:

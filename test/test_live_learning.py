@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import random
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from rclpy.serialization import serialize_message
-from ros_processes import LATCHED, NodeProcess, Peer, own_domain, values_of
+from ros_processes import LATCHED, NodeProcess, Peer, values_of
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
@@ -34,18 +33,6 @@ FIELDS = ("distance", "bearing", "battery")
 #: Without LAT the decision tree's prediction follows from the state alone.
 OPTIONS = LearnOptions(last_action=Use.NEVER, psa=Use.NEVER, max_depth=6, ccp_alpha=0.0, refit=True)
 PARAMETERS = {"last_action": "never", "psa": "never", "max_depth": 6, "ccp_alpha": 0.0}
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    with own_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def peer(domain: int) -> Iterator[Peer]:
-    with Peer(domain) as one:
-        yield one
 
 
 def _state(chance: random.Random) -> tuple[float, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,19 +17,7 @@ from rosgraph_msgs.msg import Clock
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.last_action import last_actions
-from rebt_ros.storage.recording import read_recording, recordings
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    with own_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def peer(domain: int) -> Iterator[Peer]:
-    with Peer(domain) as one:
-        yield one
+from rebt_ros.storage.recording import is_recording, read_recording, recordings
 
 
 def _recorded(directory: Path) -> list[Demonstration]:
@@ -152,7 +139,7 @@ def test_a_signal_ends_the_file_in_order(
     with NodeProcess("recorder_node", domain, tmp_path) as recorder:
         peer.state(1.0)
         peer.action("go")
-        peer.wait_until(lambda: list(tmp_path.glob("demonstrations/*.csv")))
+        peer.wait_until(lambda: list(tmp_path.glob("demonstrations/*.rec")))
         assert recorder.stop(number) == 0
         assert "Traceback" not in recorder.stderr
         assert "recorded 1 row in " in recorder.stderr
@@ -232,8 +219,11 @@ def test_rows_carry_simulated_time_where_it_is_in_use(
         def stamped() -> bool:
             peer.publish(Clock(clock=Time(sec=5)), "/clock")
             peer.action("go")
+            files = tmp_path.glob("demonstrations/*.rec")
             return any(
-                "\n5000000000," in one.read_text() for one in tmp_path.glob("demonstrations/*.csv")
+                5_000_000_000 in read_recording(one).demonstration.stamps
+                for one in files
+                if is_recording(one)
             )
 
         peer.wait_until(stamped)
@@ -261,7 +251,7 @@ def test_recording_goes_on_once_there_is_room_again(
         def kept() -> bool:
             peer.action("kept")
             peer.spin_once()
-            return any(os.stat(one).st_size for one in blocked.glob("*.csv"))
+            return any(os.stat(one).st_size for one in blocked.glob("*.rec"))
 
         peer.wait_until(kept)
         assert recorder.stop() == 0

@@ -1,11 +1,11 @@
 """Recordings: what was acknowledged is on disk, to the last bit, and damage is named."""
 
-import csv
-import json
 import os
+import re
 import signal
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from rebt_ros.demonstration.builder import LARGEST_VALUE
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError
-from rebt_ros.storage import recording
+from rebt_ros.storage import recording, recording_rows
 from rebt_ros.storage.recording import (
     RecordingError,
     RecordingWriter,
@@ -25,6 +25,7 @@ from rebt_ros.storage.recording import (
     read_recording,
     recordings,
 )
+from rebt_ros.storage.recording_rows import LABEL, record_type
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 FEATURES = (
@@ -85,11 +86,13 @@ def test_any_rows_survive(tmp_path_factory, values):
     assert_same(read_recording(writer.path).demonstration, expected)
 
 
-def test_ordinary_tools_see_the_columns_and_the_last_action(tmp_path):
-    first, *lines = written(tmp_path).read_text().splitlines()
-    assert first.startswith("# rebt_ros recording {")
-    assert json.loads(first.removeprefix("# rebt_ros recording ")) == {
-        "version": 1,
+def test_numpy_alone_reads_a_recording_as_documented(tmp_path):
+    documentation = (CHECKOUT / "docs" / "formats.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", documentation, re.DOTALL)
+    names: dict[str, object] = {"path": written(tmp_path)}
+    exec(code, names)
+    assert names["head"] == {
+        "version": 2,
         "sample_rate": None,
         "features": [
             {"name": "front", "topic": "/state", "index": 0},
@@ -97,9 +100,11 @@ def test_ordinary_tools_see_the_columns_and_the_last_action(tmp_path):
         ],
         "channels": ["/action"],
     }
-    table = list(csv.DictReader(lines))
-    assert [row["last_action"] for row in table] == ["", "go", 'say "hi", twice']
-    assert [row['left, "near"'] for row in table] == ["-2.0", "5e-324", "-0.0"]
+    rows, labels = names["rows"], names["labels"]
+    assert [labels[code] for code in rows["action"]] == [row.action for row in ROWS]
+    assert [labels[code] for code in rows["last_action"]] == ["", "go", 'say "hi", twice']
+    assert rows["state"].tolist() == [list(row.state) for row in ROWS]
+    assert rows["stamp"].tolist() == [row.stamp for row in ROWS]
 
 
 def test_a_recording_can_be_read_after_every_row(tmp_path):
@@ -135,22 +140,15 @@ for count in range(10**9):
     assert read.states[:, 0].tolist() == [count / 3 for count in range(len(read))]
 
 
-def test_a_torn_last_line_is_left_out_with_a_note(tmp_path):
+def test_a_torn_last_row_is_left_out_with_a_note(tmp_path):
     path = written(tmp_path)
     whole = path.read_bytes()
-    end_of_second = whole.rstrip(b"\n").rindex(b"\n") + 1
+    end_of_second = len(whole) - record_type(2).itemsize
     for size in (end_of_second + 1, len(whole) - 1):
         path.write_bytes(whole[:size])
         read = read_recording(path)
         assert len(read.demonstration) == 2
-        assert read.notes == ("its last line is incomplete and left out",)
-
-
-def test_a_line_torn_within_a_character_is_left_out_too(tmp_path):
-    path = written(tmp_path)
-    with path.open("ab") as file:
-        file.write("1,/action,ü".encode()[:-1])
-    assert len(read_recording(path).demonstration) == 3
+        assert read.notes == ("its last row is incomplete and left out",)
 
 
 def test_two_recorders_in_one_directory_never_share_a_file(tmp_path):
@@ -169,10 +167,10 @@ def test_recordings_come_oldest_first_and_other_files_are_passed_over(tmp_path):
     assert recordings(tmp_path) == tuple(paths)
 
 
-def test_a_file_without_its_two_first_lines_is_passed_over(tmp_path):
+def test_a_file_without_its_first_line_is_passed_over(tmp_path):
     path = written(tmp_path)
-    (tmp_path / "19990101-torn.csv").write_bytes(path.read_bytes().splitlines()[0] + b"\nstamp,")
-    (tmp_path / "19990102-empty.csv").touch()
+    (tmp_path / "19990101-torn.rec").write_bytes(path.read_bytes()[:100])
+    (tmp_path / "19990102-empty.rec").touch()
     assert recordings(tmp_path) == (path,)
 
 
@@ -193,7 +191,7 @@ def test_a_discarded_recording_is_removed(tmp_path):
         writer.write(ROWS[0])
 
 
-def test_a_full_disk_cuts_the_partial_line_off_and_keeps_the_rows_before(tmp_path, monkeypatch):
+def test_a_full_disk_cuts_the_partial_row_off_and_keeps_the_rows_before(tmp_path, monkeypatch):
     write = os.write
     with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:
         writer.write(ROWS[0])
@@ -209,9 +207,7 @@ def test_a_full_disk_cuts_the_partial_line_off_and_keeps_the_rows_before(tmp_pat
     assert read.notes == ()
 
 
-def test_a_partial_line_that_cannot_be_cut_off_now_is_cut_off_before_the_next(
-    tmp_path, monkeypatch
-):
+def test_a_partial_row_that_cannot_be_cut_off_now_is_cut_off_before_the_next(tmp_path, monkeypatch):
     write = os.write
 
     def refuse(*_):
@@ -235,7 +231,7 @@ def test_a_partial_line_that_cannot_be_cut_off_now_is_cut_off_before_the_next(
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux only")
 def test_a_real_full_disk_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(
-        recording, "_create", lambda _: (tmp_path / "gone.csv", os.open("/dev/full", os.O_WRONLY))
+        recording, "_create", lambda _: (tmp_path / "gone.rec", os.open("/dev/full", os.O_WRONLY))
     )
     with pytest.raises(RecordingError, match="No space left"):
         RecordingWriter(tmp_path, FEATURES, ["/action"])
@@ -246,6 +242,33 @@ def test_rows_are_not_acknowledged_into_a_removed_file(tmp_path):
         writer.path.unlink()
         with pytest.raises(RecordingError, match="was removed"):
             writer.write(ROWS[0])
+
+
+def test_rows_are_synced_when_asked_for_and_at_the_end(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr(recording.os, "fsync", lambda descriptor: synced.append(descriptor))
+    with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:
+        writer.write(ROWS[0])
+        assert synced == []
+        writer.sync()
+        # The file, and once its name.
+        assert len(synced) == 2
+        writer.sync()
+        assert len(synced) == 3
+    assert len(synced) == 4
+
+
+def test_a_disk_that_does_not_keep_rows_is_an_error(tmp_path, monkeypatch):
+    def refuse(_):
+        raise OSError(5, "Input/output error")
+
+    writer = RecordingWriter(tmp_path, FEATURES, ["/action"])
+    writer.write(ROWS[0])
+    monkeypatch.setattr(recording.os, "fsync", refuse)
+    for end in (writer.sync, writer.close):
+        with pytest.raises(RecordingError, match=r"may not be complete .*: check the disk"):
+            end()
+    writer.close()
 
 
 def test_a_directory_that_cannot_be_is_an_error(tmp_path):
@@ -263,6 +286,7 @@ def test_a_directory_that_cannot_be_is_an_error(tmp_path):
         ROWS[0]._replace(channel="/other"),
         ROWS[0]._replace(action=""),
         ROWS[0]._replace(action="two\nlines"),
+        ROWS[0]._replace(last_action="two\nlines"),
     ],
 )
 def test_a_row_that_could_not_be_read_back_is_not_written(tmp_path, row):
@@ -270,34 +294,72 @@ def test_a_row_that_could_not_be_read_back_is_not_written(tmp_path, row):
         writer.write(row)
 
 
+def reordered(path: Path, change) -> None:
+    """Changes the records of a file and makes their checksums right again."""
+    content = path.read_bytes()
+    start = content.index(b"\n") + 1
+    records = np.frombuffer(content[start:], record_type(2)).copy()
+    records = change(records)
+    records["checksum"] = 0
+    words = records.view("<u4").reshape(len(records), -1)
+    records["checksum"] = ~words.sum(axis=1, dtype=np.uint32)
+    path.write_bytes(content[:start] + records.tobytes())
+
+
+def changed(field, value, kind=None):
+    """A change of the first record of a row, or of a label."""
+
+    def change(records):
+        first = np.flatnonzero((records["channel"] == LABEL) == (kind == "label"))[0]
+        records[field][first] = value
+        return records
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (changed("channel", 1), "a channel is not one of those in its first line"),
+        (changed("action", 0), "an action has no label"),
+        (changed("action", 3), "an action has no label"),
+        (changed("state", (np.nan, 0.0)), "'front' is nan in row 1"),
+        (changed("state", (0.0, -np.inf)), "'left, \"near\"' is -inf in row 1"),
+        (changed("state", (1e39, 0.0)), "is 1e\\+39 in row 1, which is not within"),
+        (changed("action", 7, "label"), "the numbers of its labels are not in order"),
+        (changed("action", 2, "label"), "the numbers of its labels are not in order"),
+        (changed("last_action", 0, "label"), "a label is not printable"),
+        (changed("last_action", 3, "label"), "a label is not printable"),
+        (changed("state", np.frombuffer(b"\xff" * 16), "label"), "a label is not UTF-8"),
+        (lambda records: np.concatenate([records, records]), "the numbers of its labels are not"),
+        (lambda records: records[1:], "the numbers of its labels are not in order"),
+    ],
+)
+def test_what_no_recorder_writes_is_named_in_one_sentence(tmp_path, change, message):
+    path = written(tmp_path)
+    reordered(path, change)
+    with pytest.raises(InputError, match=message) as caught:
+        read_recording(path)
+    assert str(caught.value).endswith(".")
+    assert "\n" not in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (b"0.1,-2.0", b"0.1", "line 3: this is not a row"),
-        (b"0.1,-2.0", b"0.1,-2.0,3.0", "line 3: this is not a row"),
-        (b"0.1,-2.0", b"0.1,x", "line 3: this is not a row"),
-        (b"0.1,-2.0", b"nan,-2.0", "line 3: 'front' is nan"),
-        (b"0.1,-2.0", b"0.1,-inf", "line 3: 'left, \"near\"' is -inf"),
-        (b"0.1,-2.0", b"0.1,1e39", "line 3: 'left, \"near\"' is 1e\\+39"),
-        (b"002,/action", b"002,/other", "line 4: .*'/other' is not one of its channels"),
-        (b"1700000000000000002", b"soon", "line 4: this is not a row"),
-        (b"1700000000000000002", b"9" * 19, "line 4: .* is not a stamp"),
-        (b',"say ""hi"", twice",go', b',"say,go', "line 4: this is not a row"),
-        (b"/action,go", b"/action,", "line 3: .* is not an action"),
-        (b"/action,go", b"/action,g\xff", "line 3: this is not a row"),
-        (b"\n17", b"\n\n17", "line 3: this is not a row"),
-        (b"stamp,channel", b"stamps,channel", "line 2: the columns must be"),
-        (b'"version": 1', b'"version": 2', "its version is 2, not 1"),
+        (b'"version": 2', b'"version": 3', "its version is 3, not 1 or 2: use the version"),
+        (b'"version": 2', b'"version": true', "its version is True"),
         (b'"features": [', b'"features": 7, "x": [', "lists no features"),
         (b'"name": "front"', b'"name": 7', "is not a feature"),
         (b'"index": 0', b'"index": null', "needs both a topic and an index"),
         (b'"topic": "/state", "index": 0', b'"index": true', "is not a feature"),
+        (b'["/action"]', b'["/action", "/action"]', "two channels have the same name"),
         (b"recording {", b"recording ", "cannot be read"),
         (b"recording {", b"recording " + b"[" * 100_000, "nested too deeply"),
         (b"# rebt_ros recording", b"# something", "is not a recording"),
     ],
 )
-def test_damage_is_named_in_one_sentence(tmp_path, old, new, message):
+def test_a_wrong_first_line_is_named_in_one_sentence(tmp_path, old, new, message):
     path = written(tmp_path)
     whole = path.read_bytes()
     assert old in whole
@@ -306,6 +368,62 @@ def test_damage_is_named_in_one_sentence(tmp_path, old, new, message):
         read_recording(path)
     assert str(caught.value).endswith(".")
     assert "\n" not in str(caught.value)
+
+
+@given(st.data())
+def test_a_changed_byte_of_a_record_is_noticed(tmp_path_factory, data):
+    path = written(tmp_path_factory.mktemp("changed"))
+    content = bytearray(path.read_bytes())
+    place = data.draw(st.integers(content.index(b"\n") + 1, len(content) - 1))
+    content[place] ^= data.draw(st.integers(1, 255))
+    path.write_bytes(content)
+    in_last = place >= len(content) - record_type(2).itemsize
+    if in_last:
+        read = read_recording(path)
+        assert len(read.demonstration) == 2
+        assert read.notes == ("its last 1 records are damaged and left out",)
+    else:
+        with pytest.raises(InputError, match="damaged: restore the file"):
+            read_recording(path)
+
+
+def test_blocks_that_a_loss_of_power_left_empty_are_left_out_with_a_note(tmp_path):
+    path = written(tmp_path)
+    size = record_type(2).itemsize
+    with path.open("ab") as file:
+        file.write(bytes(3 * size + 1))
+    read = read_recording(path)
+    assert len(read.demonstration) == 3
+    assert read.notes == (
+        "its last row is incomplete and left out",
+        "its last 3 records are damaged and left out",
+    )
+
+
+def test_a_recording_is_read_in_parts_alike(tmp_path, monkeypatch):
+    rows = [Row(n, "/action", f"label {n % 7}" * 9, None, (n / 3, -n)) for n in range(100)]
+    path = written(tmp_path, rows)
+    monkeypatch.setattr(recording_rows, "_CHUNK", 3 * record_type(2).itemsize)
+    assert_same(read_recording(path).demonstration, Demonstration.from_rows("", FEATURES, rows))
+
+
+def test_reading_takes_little_more_memory_than_the_table(tmp_path):
+    features = tuple(Feature(f"f{index}") for index in range(24))
+    row = Row(0, "/action", "go", None, tuple(map(float, range(24))))
+    with RecordingWriter(tmp_path, features, ["/action"]) as writer:
+        writer.write(row)
+    content = writer.path.read_bytes()
+    with writer.path.open("ab") as file:
+        for _ in range(100):
+            file.write(content[-record_type(24).itemsize :] * 1000)
+    tracemalloc.start()
+    try:
+        states = read_recording(writer.path).demonstration.states
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert states.shape == (100_001, 24)
+    assert peak < 2 * states.nbytes
 
 
 def test_missing_files_and_directories_are_refused(tmp_path):
@@ -321,3 +439,14 @@ def test_missing_files_and_directories_are_refused(tmp_path):
 def test_numpy_numbers_are_written_like_others(tmp_path):
     path = written(tmp_path, [ROWS[0]._replace(state=tuple(np.array([0.5, 0.25])))])
     assert read_recording(path).demonstration.states.tolist() == [[0.5, 0.25]]
+
+
+def test_the_last_action_of_a_first_row_is_read_back(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path, (Feature("x", topic="s", index=0),), ["arm", "base"]) as writer:
+        writer.write(Row(1, "base", "go", "turn", (0.0,)))
+        writer.write(Row(2, "base", "stop", "go", (0.0,)))
+        writer.write(Row(3, "arm", "lift", None, (0.0,)))
+        writer.write(Row(4, "arm", "drop", "lift", (0.0,)))
+    demonstration = read_recording(writer.path).demonstration
+    assert demonstration.before == {"base": "turn"}
+    assert demonstration.actions == ("drop", "go", "lift", "stop")

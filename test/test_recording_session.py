@@ -20,6 +20,7 @@ class Disk:
     def __init__(self) -> None:
         self.files: list[File] = []
         self.full = False
+        self.syncs = 0
 
     def open(self, features: tuple[Feature, ...]) -> File:
         self.check()
@@ -46,6 +47,10 @@ class File:
     def write(self, row: Row) -> None:
         self._disk.check()
         self.written.append(row)
+
+    def sync(self) -> None:
+        self._disk.check()
+        self._disk.syncs += 1
 
     def close(self) -> None:
         self.end = "closed"
@@ -120,6 +125,24 @@ def test_a_full_disk_ends_a_demonstration_and_room_begins_another() -> None:
     assert desk.faults == ["write error"] * 2
 
 
+def test_a_disk_that_does_not_keep_its_rows_ends_a_demonstration() -> None:
+    desk = Desk()
+    desk.session.sync(0)
+    desk.session.start(0)
+    desk.session.observe(1, "state", [1.0], [])
+    desk.session.sync(1)
+    desk.session.act(2, "action", "go")
+    desk.session.sync(3)
+    assert (desk.disk.syncs, desk.session.failure) == (1, "")
+    desk.disk.full = True
+    desk.session.sync(4)
+    assert desk.session.failure == "the disk is full."
+    desk.disk.full = False
+    desk.session.act(5, "action", "turn")
+    assert desk.session.failure == ""
+    assert desk.rows() == [[("go", None, (1.0,))], [("turn", None, (1.0,))]]
+
+
 def test_a_new_length_is_accepted_by_a_new_demonstration_only() -> None:
     desk = Desk()
     desk.session.start(0)
@@ -187,3 +210,55 @@ def test_a_held_action_is_sampled_on_in_the_next_demonstration() -> None:
 def test_wrong_topics_are_refused_before_anything_is_recorded() -> None:
     with pytest.raises(OptionError, match="must differ"):
         RecordingSession([StateTopic("a")], ["a"], None, Disk().open, lambda *_: None)
+
+
+SECOND = 10**9
+
+
+def test_what_a_person_does_while_the_executor_drives_is_a_demonstration_of_its_own() -> None:
+    desk = Desk()
+    desk.session.start(0)
+    desk.session.observe(1, "state", [1.0], [])
+    desk.session.act(2, "action", "go")
+    desk.session.command(1 * SECOND, "action", "turn")
+    assert desk.disk.files[0].end == "closed"
+    desk.session.command(2 * SECOND, "action", "go")
+    desk.session.act(3 * SECOND, "action", "stop")
+    desk.session.act(4 * SECOND, "action", "go")
+    desk.session.drive(5 * SECOND, True)
+    assert desk.disk.files[1].end == "closed"
+    # Held at once: it drove, and commanded nothing.
+    desk.session.act(6 * SECOND, "action", "go")
+    assert desk.rows() == [
+        [("go", None, (1.0,))],
+        [("stop", "go", (1.0,)), ("go", "stop", (1.0,))],
+        [("go", "stop", (1.0,))],
+    ]
+    assert desk.session.takeovers == 2
+
+
+def test_an_action_is_held_no_longer_than_until_the_executor_drives() -> None:
+    desk = Desk(sample_rate=10.0)
+    desk.session.start(0)
+    desk.session.observe(0, "state", [1.0], [])
+    desk.session.act(0, "action", "go")
+    desk.session.observe(2 * SECOND // 10, "state", [2.0], [])
+    desk.session.command(SECOND // 2, "action", "turn")
+    rows = len(desk.rows()[0])
+    for tenth in range(6, 20):
+        desk.session.observe(tenth * SECOND // 10, "state", [3.0], [])
+    assert len(desk.disk.files) == 1
+    assert len(desk.rows()[0]) == rows
+    desk.session.act(2 * SECOND, "action", "stop")
+    desk.session.observe(2 * SECOND + 1, "state", [3.0], [])
+    assert desk.rows()[1] == [("stop", "turn", (3.0,))]
+
+
+def test_who_drives_is_known_also_while_nothing_is_recorded() -> None:
+    desk = Desk()
+    desk.session.observe(1, "state", [1.0], [])
+    desk.session.command(2, "action", "turn")
+    desk.session.act(SECOND, "action", "go")
+    desk.session.start(SECOND + 1)
+    desk.session.act(SECOND + 2, "action", "go")
+    assert desk.rows() == [[("go", None, (1.0,))]]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ pytest.importorskip("rclpy")
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from ros_processes import NodeProcess, Peer, own_domain
+from ros_processes import NodeProcess, Peer
 from std_msgs.msg import Float64MultiArray, String
 
 from rebt_ros.simulation.demonstrator import decide
@@ -24,18 +23,6 @@ from rebt_ros.simulation.robot import Robot, State
 from rebt_ros.simulation.world import furnished_room
 
 EPISODES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    with own_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def peer(domain: int) -> Iterator[Peer]:
-    with Peer(domain) as one:
-        yield one
 
 
 def _bearing(states: list[Float64MultiArray]) -> float:

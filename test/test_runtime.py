@@ -6,8 +6,10 @@ F failure.  The tables beside the tests show the ticks as rows.
 
 from __future__ import annotations
 
+import gc
 import itertools
 import math
+import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -487,6 +489,26 @@ def test_a_runtime_can_go_on_with_a_history() -> None:
     runtime = TreeRuntime(some.learned(tree), histories={some.CHANNEL: history})
     assert runtime.tick(FAR_AWAY).actions == (GO,)
     assert history.before("wait") == "go"
+
+
+def test_a_runtime_that_is_taken_apart_leaves_no_garbage() -> None:
+    tree = nodes.Selector(
+        (
+            some.when(Literal(LastActionIs("go", ("turn",))), then=some.action("turn")),
+            some.action("go"),
+        )
+    )
+    runtime = TreeRuntime(some.learned(tree))
+    runtime.tick(NEARBY)
+    behaviours = [weakref.ref(one) for one in runtime.root.iterate()]
+    gc.collect()
+    gc.disable()
+    try:
+        runtime.dismantle()
+        del runtime
+        assert [one() for one in behaviours] == [None] * len(behaviours)
+    finally:
+        gc.enable()
 
 
 def test_two_runtimes_in_one_process_do_not_disturb_each_other() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -331,3 +332,23 @@ def test_values_that_contradict_themselves_cannot_be_built(build: object) -> Non
 def test_user_errors_are_one_family() -> None:
     assert issubclass(InputError, RebtError)
     assert issubclass(OptionError, RebtError)
+
+
+def test_a_correction_begins_with_the_last_action_of_the_robot() -> None:
+    def shown(actions: list[str], before: dict[str, str]) -> Demonstration:
+        rows = [Row(place, "action", one, None, (0.0,)) for place, one in enumerate(actions)]
+        return replace(Demonstration.from_rows("d", (Feature("x"),), rows), before=before)
+
+    (table,) = tabulate(
+        [
+            shown(["go", "go", "turn"], {}),
+            shown(["go", "turn"], {"action": "turn"}),
+            # What nobody showed is no action of the table, and so no condition.
+            shown(["go"], {"action": "wait", "arm": "turn"}),
+        ]
+    )
+    assert table.actions == ("go", "turn")
+    assert table.last.tolist() == [-1, -1, 0, 1, 0, -1]
+    # A part that begins inside of it does not.
+    assert table.where(np.array([0, 0, 0, 1, 1, 1], dtype=bool)).last.tolist() == [1, 0, -1]
+    assert table.where(np.array([1, 0, 0, 0, 1, 1], dtype=bool)).last.tolist() == [-1, -1, -1]

@@ -26,6 +26,13 @@ from rebt_ros.behavior_tree.learned_tree import (
     Suggestion,
     SuggestionKind,
 )
+from rebt_ros.behavior_tree.shown import (
+    MOST_SHOWN_LEAVES,
+    ShownChannel,
+    ShownLeaf,
+    ShownValues,
+    Span,
+)
 from rebt_ros.demonstration.schema import LARGEST_LAG, Feature, FeatureKind
 from rebt_ros.errors import DocumentError
 from rebt_ros.logic.conditions import (
@@ -39,7 +46,9 @@ from rebt_ros.logic.conditions import (
 )
 
 FORMAT = "rebt_ros/behavior_tree"
-VERSION = 1
+#: Version 1 had no ``shown``; it is read still.
+VERSION = 2
+_READ = (1, VERSION)
 
 #: Longest document that is read, in characters.
 LARGEST_DOCUMENT = 4_000_000
@@ -129,7 +138,23 @@ def _encode(learned: LearnedTree) -> Json:
             for one in learned.suggestions
         ],
         "provenance": _encode_provenance(learned.provenance),
+        "shown": [
+            {
+                "channel": one.channel,
+                "leaves": [
+                    {"rows": leaf.rows, "values": [_encode_shown(values) for values in leaf.values]}
+                    for leaf in one.leaves
+                ],
+            }
+            for one in learned.shown
+        ],
     }
+
+
+def _encode_shown(values: ShownValues) -> list[float] | list[str] | None:
+    if values is None:
+        return None
+    return [values.low, values.high] if isinstance(values, Span) else list(values)
 
 
 def _encode_provenance(provenance: Provenance) -> Json:
@@ -304,13 +329,15 @@ class _Place:
 def _learned_tree(place: _Place) -> LearnedTree:
     if not isinstance(place.value, dict) or place.value.get("format") != FORMAT:
         raise DocumentError(f"the document does not say that its format is {FORMAT!r}.")
-    if place.value.get("version") != VERSION or isinstance(place.value["version"], bool):
+    version = place.value.get("version")
+    if isinstance(version, bool) or version not in _READ:
         raise DocumentError(
-            f"the document has version {_shown(place.value.get('version'))}: "
-            f"this release of rebt_ros reads version {VERSION}."
+            f"the document has version {_shown(version)}: "
+            f"this release of rebt_ros reads the versions {' and '.join(map(str, _READ))}."
         )
+    since_2 = ("shown",) if version == VERSION else ()
     fields = place.fields(
-        "format", "version", "features", "actions", "tree", "suggestions", "provenance"
+        "format", "version", "features", "actions", "tree", "suggestions", "provenance", *since_2
     )
     try:
         return LearnedTree(
@@ -319,6 +346,7 @@ def _learned_tree(place: _Place) -> LearnedTree:
             tree=_node(fields["tree"], DEEPEST_TREE),
             provenance=_provenance(fields["provenance"]),
             suggestions=fields["suggestions"].items(_suggestion),
+            shown=fields["shown"].items(_shown_channel) if since_2 else (),
         )
     except ValueError as err:
         raise DocumentError(f"the document contradicts itself: {_cut(str(err), 200)}.") from err
@@ -351,6 +379,30 @@ def _suggestion(place: _Place) -> Suggestion:
         _node(fields["tree"], DEEPEST_TREE),
         fields["attached"].truth(),
     )
+
+
+def _shown_channel(place: _Place) -> ShownChannel:
+    fields = place.fields("channel", "leaves")
+    leaves = fields["leaves"].items(_shown_leaf)
+    if len(leaves) > MOST_SHOWN_LEAVES:
+        fields["leaves"].refuse(f"an array of at most {MOST_SHOWN_LEAVES} elements")
+    return ShownChannel(fields["channel"].text(), leaves)
+
+
+def _shown_leaf(place: _Place) -> ShownLeaf:
+    fields = place.fields("rows", "values")
+    return ShownLeaf(fields["rows"].whole(), fields["values"].items(_shown_values))
+
+
+def _shown_values(place: _Place) -> ShownValues:
+    if place.value is None:
+        return None
+    if isinstance(place.value, list) and place.value and isinstance(place.value[0], str):
+        return place.items(_Place.text)
+    numbers = place.items(_Place.number)
+    if len(numbers) != 2:
+        place.refuse("null, two numbers or categories")
+    return Span(*numbers)
 
 
 def _provenance(place: _Place) -> Provenance:

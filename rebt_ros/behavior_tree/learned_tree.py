@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.shown import ShownChannel, problems
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import HasCategory, Interval, IsTrue, LastActionIs, Threshold
 
@@ -86,7 +87,7 @@ class LearnedTree:
 
     Raises:
         ValueError: The tree tests a feature, category or action, or takes an action, that is not
-            declared.
+            declared, or what was shown does not fit the features.
     """
 
     features: tuple[Feature, ...]
@@ -95,6 +96,8 @@ class LearnedTree:
     tree: nodes.Node
     provenance: Provenance
     suggestions: tuple[Suggestion, ...] = field(default=())
+    shown: tuple[ShownChannel, ...] = ()
+    """What each channel was learned from, leaf by leaf; empty where that is not known."""
 
     def __post_init__(self) -> None:
         for problem in self._problems():
@@ -113,6 +116,7 @@ class LearnedTree:
                     yield f"action {action.label!r} on {action.channel!r} is not declared"
             for condition in nodes.conditions(tree):
                 yield from _problems_of(condition, categories, labels)
+        yield from problems(self.shown, self.features)
 
 
 def _problems_of(

@@ -34,9 +34,13 @@ class TrainedTree:
 
     def predict(self, table: DemonstrationTable) -> IntArray:
         """scikit-learn's own prediction: positions in ``table.actions``, shape (rows,)."""
-        leaves = self.classifier.apply(encode(table, self.uses_last_action))
         majority = np.argmax(self.classifier.tree_.value[:, 0, :], axis=1)
-        return np.asarray(self.classifier.classes_[majority[self.standing[leaves]]], dtype=np.int64)
+        return np.asarray(self.classifier.classes_[majority[self.leaves(table)]], dtype=np.int64)
+
+    def leaves(self, table: DemonstrationTable) -> IntArray:
+        """The node of the classifier that decides for each row, shape (rows,)."""
+        reached = self.classifier.apply(encode(table, self.uses_last_action))
+        return np.asarray(self.standing[reached], dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

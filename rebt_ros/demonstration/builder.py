@@ -7,7 +7,7 @@ received, into a `DemonstrationBuilder`; it answers with the rows that they comp
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -69,6 +69,7 @@ class DemonstrationBuilder:
         topics: State topics, in the order of their features.
         channels: Action topics; each is a channel with a LAT of its own.
         sample_rate: Rows per second and channel while an action holds; None for event mode.
+        before: What was done on each channel before the demonstration, most recent last.
 
     Raises:
         OptionError: No topic or channel, one named twice, or a rate that makes no sense.
@@ -79,6 +80,7 @@ class DemonstrationBuilder:
         topics: Sequence[StateTopic],
         channels: Sequence[str],
         sample_rate: float | None = None,
+        before: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         names = [topic.name for topic in topics]
         if not names or not channels:
@@ -93,7 +95,9 @@ class DemonstrationBuilder:
         self._fields: dict[str, tuple[str, ...]] = {one.name: one.fields for one in topics}
         self._latest: dict[str, tuple[float, ...]] = {}
         self._features: tuple[Feature, ...] | None = None
-        self._history = {channel: ActionHistory() for channel in channels}
+        self._history = {
+            channel: ActionHistory((before or {}).get(channel, ())) for channel in channels
+        }
         self._held: dict[str, str] = {}
         self._period = None if sample_rate is None else round(1e9 / sample_rate)
         self._next_sample: int | None = None
@@ -155,7 +159,7 @@ class DemonstrationBuilder:
             raise BadMessageError(
                 Fault.UNKNOWN_TOPIC, f"{channel!r} is not one of the action topics."
             )
-        if any(not one.isprintable() for one in label):
+        if not label.isprintable():
             raise BadMessageError(
                 Fault.LABEL,
                 f"action topic {channel!r} sent the label {label!r}: "
@@ -239,6 +243,15 @@ def _features(fields: dict[str, tuple[str, ...]]) -> tuple[Feature, ...]:
         for topic in fields
         for index, name in enumerate(fields[topic])
     )
+
+
+def is_label(text: str) -> bool:
+    r"""Whether an action can have this label.
+
+    >>> is_label("turn left"), is_label(""), is_label("two\nlines")
+    (True, False, False)
+    """
+    return bool(text) and text.isprintable()
 
 
 def _base(topic: str) -> str:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +34,7 @@ class Row(NamedTuple):
 class Demonstration:
     """The rows of one demonstration, by column.
 
-    LAT is not among them: it follows from the actions (see `last_action`).
+    LAT is not among them: it follows from the actions (see `last_action`) and from `before`.
     """
 
     name: str
@@ -52,6 +52,9 @@ class Demonstration:
     """Channels that occur, sorted."""
     channel: IntArray
     """Position in `channels` of each row's channel, shape (rows,)."""
+    before: Mapping[str, str] = field(default_factory=dict)
+    """LAT of the first row of a channel, where something was done before that was not recorded:
+    a correction begins amid what the robot did by itself."""
 
     def __post_init__(self) -> None:
         rows = len(self.chosen)

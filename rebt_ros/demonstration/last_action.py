@@ -37,23 +37,35 @@ class ActionHistory:
         """LAT as seen by a rule for `deciding`: the most recent action that is none of them."""
         return next((action for action in self._recent if action not in deciding), None)
 
+    @property
+    def taken(self) -> tuple[str, ...]:
+        """The distinct actions, the most recent one last: `ActionHistory` of them is the same."""
+        return tuple(reversed(self._recent))
+
     def clear(self) -> None:
         """Forgets everything, as at the start of a demonstration."""
         self._recent.clear()
 
 
-def last_actions(actions: IntArray, demonstrations: IntArray) -> IntArray:
+def last_actions(
+    actions: IntArray, demonstrations: IntArray, before: IntArray | None = None
+) -> IntArray:
     """LAT of every row of one channel.
 
     Args:
         actions: Action codes in the order in which they were taken, shape (rows,).
         demonstrations: Number of each row's demonstration, shape (rows,); its rows stand together.
+        before: LAT of the first row of each demonstration, by its number; none where it is None.
 
     Returns:
         Codes of the last actions taken, shape (rows,); `NO_ACTION` where there is none.
 
     >>> last_actions(np.array([0, 0, 1, 0, 2]), np.array([0, 0, 0, 0, 1])).tolist()
     [-1, -1, 0, 1, -1]
+    >>> last_actions(
+    ...     np.array([0, 0, 1, 0, 2]), np.array([0, 0, 0, 0, 1]), np.array([3, -1])
+    ... ).tolist()
+    [3, 3, 0, 1, -1]
     """
     rows = len(actions)
     if rows == 0:
@@ -65,4 +77,5 @@ def last_actions(actions: IntArray, demonstrations: IntArray) -> IntArray:
     changed[1:] |= actions[1:] != actions[:-1]
     # All rows of a run of equal actions look back at the row before the run.
     start = np.maximum.accumulate(np.where(changed, np.arange(rows), 0))
-    return np.where(border[start], NO_ACTION, actions[start - 1]).astype(np.int64)
+    first = NO_ACTION if before is None else before[demonstrations]
+    return np.where(border[start], first, actions[start - 1]).astype(np.int64)

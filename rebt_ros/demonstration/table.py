@@ -10,7 +10,7 @@ import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.demonstration.demonstration import Demonstration
-from rebt_ros.demonstration.last_action import last_actions
+from rebt_ros.demonstration.last_action import NO_ACTION, last_actions
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError, OptionError
 
@@ -38,9 +38,12 @@ class DemonstrationTable:
     """Nanoseconds, shape (rows,)."""
     last: IntArray = field(init=False)
     """Position in `actions` of each row's LAT, `NO_ACTION` where there is none, shape (rows,)."""
+    before: IntArray | None = None
+    """LAT of each demonstration's first row, as in `last`, shape (demonstrations,); None: none."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "last", last_actions(self.chosen, self.demonstration))
+        last = last_actions(self.chosen, self.demonstration, self.before)
+        object.__setattr__(self, "last", last)
 
     def __len__(self) -> int:
         return len(self.chosen)
@@ -56,7 +59,16 @@ class DemonstrationTable:
             chosen=self.chosen[rows],
             demonstration=self.demonstration[rows],
             stamps=self.stamps[rows],
+            before=self._before_parts(rows),
         )
+
+    def _before_parts(self, rows: BoolArray) -> IntArray | None:
+        if self.before is None:
+            return None
+        present, first = np.unique(self.demonstration, return_index=True)
+        before = self.before.copy()
+        before[present[~rows[first]]] = NO_ACTION
+        return before
 
     def held_out(self, fraction: float) -> BoolArray:
         """Which rows to test on rather than to learn from, shape (rows,).
@@ -127,7 +139,17 @@ def _channel_table(
         tuple(one.name for one in demonstrations),
         np.repeat(np.arange(len(demonstrations)), lengths)[rows],
         np.concatenate([one.stamps for one in demonstrations])[rows],
+        _before(channel, demonstrations, actions.tolist()),
     )
+
+
+def _before(
+    channel: str, demonstrations: Sequence[Demonstration], actions: Sequence[str]
+) -> IntArray | None:
+    """LAT of each demonstration's first row; of what nobody ever showed, there is no condition."""
+    known = {action: code for code, action in enumerate(actions)}
+    codes = [known.get(one.before.get(channel, ""), NO_ACTION) for one in demonstrations]
+    return np.array(codes, dtype=np.int64) if any(one.before for one in demonstrations) else None
 
 
 def _joined_states(

@@ -14,6 +14,7 @@ from rebt_ros.algorithms.priority_root import MOST_LEAVES_BY_DOMAIN
 from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.choosing import convert
+from rebt_ros.decision_tree.shown_rows import shown_rows
 from rebt_ros.decision_tree.tree import DecisionTree
 from rebt_ros.errors import OptionError
 from rebt_ros.options import LearnOptions
@@ -105,12 +106,14 @@ class Family:
         whole = convert(trained, self.options, psa=learning.policy.psa)
         tree, _ = accept(whole, (), replace(self.options, attach=()))
         figures = figures_of(learning.table, learning.held_out, trained, tree)
+        learned = as_learned(learning.table, trained, tree, ccp_alpha, figures, self.options)
+        ranges = shown_rows(learning.table.where(~learning.held_out), trained)
         return Level(
             number,
             ccp_alpha,
             trained.tree,
             leaves,
-            as_learned(learning.table, trained, tree, ccp_alpha, figures, self.options),
+            replace(learned, shown=(ranges,)),
             self._cross_validated(ccp_alpha),
             chosen,
             number == self.best,

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from py_trees.common import Status
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import String
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.errors import DocumentError
 from rebt_ros.ros.action_results import ActionResults
+
+#: Of the topic on which the executor says whether it drives; who comes later hears the latest.
+DRIVING_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def topic_of(base: str, channel: str, channels: Sequence[str]) -> str:
@@ -90,6 +95,11 @@ class CommandChannels:
             channel.close()
 
     @property
+    def topics(self) -> frozenset[str]:
+        """The full names of the topics that commands are sent on."""
+        return frozenset(channel.topic for channel in self._channels.values())
+
+    @property
     def sent(self) -> dict[str, str | None]:
         """The latest command of each channel; None where it rests."""
         return {name: channel.sent for name, channel in self._channels.items()}
@@ -110,6 +120,11 @@ class CommandChannels:
         return sum(
             self._channels[name].send(label, self._every_tick) for name, label in latest.items()
         )
+
+    def send_to_all(self, label: str) -> None:
+        """Sends a command that is none of the tree's on every channel."""
+        for channel in self._channels.values():
+            channel.publish(label)
 
     def rest(self) -> None:
         """What is commanded next is sent, be it what was commanded last."""
@@ -146,9 +161,16 @@ class _Channel:
         started = self.results is not None and self.results.started
         due = every_tick or started or label != self.sent
         if due:
-            self._publisher.publish(String(data=label))
+            self.publish(label)
         self.sent = label
         return due
+
+    @property
+    def topic(self) -> str:
+        return str(self._publisher.topic_name)
+
+    def publish(self, label: str) -> None:
+        self._publisher.publish(String(data=label))
 
     def close(self) -> None:
         self._node.destroy_publisher(self._publisher)

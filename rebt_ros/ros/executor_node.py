@@ -2,34 +2,38 @@
 
 from __future__ import annotations
 
+import gc
 import json
+import sys
 import time
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
-from rclpy.clock import Clock
+from rclpy.clock import Clock, JumpThreshold, TimeJump
 from rclpy.clock_type import ClockType
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import SetBool
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.document import dumps, loads
-from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
+from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.demonstration.builder import BadMessageError
 from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
+from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError
 from rebt_ros.ros import lifetime
-from rebt_ros.ros.command_channels import CommandChannels
+from rebt_ros.ros.background import Background
+from rebt_ros.ros.command_channels import DRIVING_QOS, CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
-from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.executor_settings import declare_settings
+from rebt_ros.ros.novelty_guard import NoveltyGuard
+from rebt_ros.ros.takeover import Takeover, channel_of
 from rebt_ros.ros.topic_names import check_topics
-from rebt_ros.ros.tree_inputs import Message, TreeInputs
+from rebt_ros.ros.tree_inputs import Message
+from rebt_ros.ros.tree_program import Preparation, TreeProgram
 from rebt_ros.storage.tree_file import read_tree
 
 _TREE_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -40,11 +44,18 @@ _STATE_QOS: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFOR
 #: Least time between two snapshots (seconds).
 _SNAPSHOT_PERIOD: Final = 0.2
 
+#: How long another thread may keep a tick waiting (seconds); Python's default is 5 ms.
+_HAND_OVER: Final = 0.0005
+
 _REFUSED: Final = "refused trees"
+_NOVEL: Final = "states outside what was shown"
 
 
 class ExecutorNode(Node):
-    """Ticks the latest tree at a fixed rate, while it is enabled and the state is fresh.
+    """Ticks the latest tree at a fixed rate, while it is enabled and nothing speaks against it.
+
+    What does: a state that is not fresh, a person who has taken over, and, where that is asked
+    for, a state outside what was shown.
 
     Raises:
         RebtError: A parameter makes no sense, or the tree file cannot be used.
@@ -52,74 +63,62 @@ class ExecutorNode(Node):
 
     def __init__(self) -> None:
         super().__init__("executor")
-        declare = Parameters(self)
-        tree_file = declare.text(
-            "tree_file", "", "Behavior tree document to begin with; empty for none."
-        )()
-        rate = declare.number(
-            "rate",
-            20.0,
-            "Ticks per second; the recording's sample rate if the tree has lagged features.",
-            0.1,
-            1000.0,
-        )()
-        timeout = declare.number(
-            "state_timeout", 0.5, "How long a state message is good for (seconds).", 0.001, 3600.0
-        )()
-        every_tick = (
-            declare.text(
-                "publish",
-                "every_tick",
-                "When to send the command.",
-                choices=("every_tick", "on_change"),
-            )()
-            == "every_tick"
-        )
-        self._enabled = declare.flag(
-            "enabled", False, "Whether to command the robot from the start, see ~/enable."
-        )()
-        result_topic = declare.text(
-            "action_result_topic",
-            "",
-            "String topic that says 'success' or 'failure' (or 'label:success') when an action "
-            "has ended; empty if an action is done once its command is out.",
-        )()
-        state_topic = declare.text(
-            "state_topic", "state", "State topic of a tree that was learned from a table."
-        )()
-
+        self._settings = settings = declare_settings(self)
         self._faults = Faults(self.get_logger())
-        self._channels = CommandChannels(self, result_topic, every_tick, self._note_result)
+        self._channels = CommandChannels(
+            self, settings.action_result_topic, settings.every_tick, self._note_result
+        )
         # Open before there is a tree, whose first command may then be heard.
         self._channels.follow([DEFAULT_CHANNEL])
-        self._new_inputs: Callable[[LearnedTree], TreeInputs] = partial(
-            TreeInputs, default_topic=state_topic, timeout=round(timeout * 1e9)
-        )
-        self._document = ""
-        self._runtime: TreeRuntime | None = None
-        self._inputs: TreeInputs | None = None
+        self._histories: dict[str, ActionHistory] = {}
+        self._preparation = Preparation(settings, self._channels, self._histories)
+        self._takeover = Takeover(settings.takeover.timeout)
+        self._guard = NoveltyGuard(settings.novelty.mode)
+        self._program: TreeProgram | None = None
+        # Runs once it is known that its topics send what it reads.
+        self._candidate: TreeProgram | None = None
+        self._latest: dict[str, Message] = {}
         self._subscriptions_by_topic: dict[str, Subscription] = {}
+        self._enabled = settings.enabled
         self._resting = True
+        # Whether the robot may still do what it was told last, by the tree or by a person.
+        self._moving = False
         self._ticks = 0
         self._commands = 0
         self._slowest = 0.0
         self._last_snapshot = ""
         self._watchers = 0
-
-        # Simulated time where that is used; else a clock that nobody sets.
-        simulated = bool(self.get_parameter("use_sim_time").value)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._time = self.get_clock() if simulated else steady
-
         self._snapshot = self.create_publisher(String, "~/snapshot", 10)
-        if tree_file:
-            learned = read_tree(Path(tree_file).expanduser())
-            self._run(learned, dumps(learned))
+        self._driving = self.create_publisher(Bool, "~/driving", DRIVING_QOS)
+        self._said_to_drive: bool | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        """Opens everything that calls back."""
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        # Simulated time where that is used; else a clock that nobody sets.
+        self._simulated = bool(self.get_parameter("use_sim_time").value)
+        self._time = self.get_clock() if self._simulated else steady
+        if self._simulated:
+            back = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1))
+            self._jumps = self._time.create_jump_callback(
+                back, post_callback=self._on_clock_set_back
+            )
+        ready = self.create_guard_condition(self._take_prepared)
+        self._background = Background(self._preparation.read, ready.trigger)
         self.create_subscription(String, "behavior_tree", self._on_document, _TREE_QOS)
+        for topic in self._settings.takeover.topics:
+            self.create_subscription(String, topic, partial(self._on_person, topic), 10)
+        if self._settings.tree_file is not None:
+            learned = read_tree(self._settings.tree_file)
+            program = self._preparation.program(learned, dumps(learned))
+            self._check_topics(program)
+            self._install(program)
         self.create_service(SetBool, "~/enable", self._enable)
-        self.create_timer(1.0 / rate, self._tick, clock=self._time)
+        self.create_timer(1.0 / self._settings.rate, self._tick, clock=self._time)
         self.create_timer(_SNAPSHOT_PERIOD, self._publish_snapshot, clock=steady)
         self._diagnostics = Diagnostics(self, "execution", self._report)
+        self._say_who_drives()
         self.get_logger().info(
             f"{'enabled' if self._enabled else 'disabled until ~/enable is called'}: "
             f"{self._condition()}."
@@ -128,66 +127,141 @@ class ExecutorNode(Node):
     def close(self) -> None:
         """Interrupts what runs."""
         self._enabled = False
-        self._rest()
+        self._background.close()
+        self._interrupt()
+
+    # --- trees ---
 
     def _on_document(self, message: String) -> None:
-        if message.data == self._document:
-            return
+        # Reading may take longer than a tick.
+        self._background.put(message.data)
+
+    def _take_prepared(self) -> None:
+        for prepared in self._background.take():
+            if isinstance(prepared, DocumentError):
+                self._refuse(str(prepared))
+            elif self._program is not None and prepared.document == self._program.document:
+                self._preparation.retire(prepared)
+            else:
+                self._propose(prepared)
+        self._try_candidate()
+
+    def _propose(self, program: TreeProgram) -> None:
+        """Makes a program the candidate, if there can be topics of the names in it."""
         try:
-            self._run(loads(message.data), message.data)
+            self._check_topics(program)
         except DocumentError as err:
-            kept = "the tree before it stays" if self._runtime else "there is no tree yet"
-            self._faults.note(_REFUSED, f"a behavior tree was refused ({kept}): {err}", severe=True)
+            self._preparation.retire(program)
+            self._refuse(str(err))
+            return
+        self._discard_candidate()
+        self._candidate = program
+        self._subscribe()
 
-    def _run(self, learned: LearnedTree, document: str) -> None:
-        """Takes a tree into use; the action that runs is interrupted, the history goes on.
+    def _check_topics(self, program: TreeProgram) -> None:
+        check_topics(self, program.inputs.topics, self._channels.topics_of(program.channels))
 
-        Raises:
-            DocumentError: This node cannot run the tree.
-        """
-        commanded = {action.channel for action in nodes.actions(learned.tree)}
-        if commanded != set(nodes.policies(learned.tree)):
-            raise DocumentError(
-                f"the tree mixes the channels {', '.join(sorted(commanded))} in one policy: "
-                "put the policies of several channels side by side under a Parallel."
-            )
-        inputs = self._new_inputs(learned)
-        channels = sorted({action.channel for action in learned.actions})
-        check_topics(self, inputs.topics, self._channels.topics_of(channels))
-        self._rest()
-        self._channels.follow(channels)
-        histories = self._runtime.histories if self._runtime else {}
-        runtime = TreeRuntime(learned, self._channels, executable(learned.tree), histories)
-        known = {} if self._inputs is None else self._inputs.latest
-        self._document, self._runtime, self._inputs = document, runtime, inputs
-        self._subscribe(inputs)
-        for topic in known.keys() & set(inputs.topics):
-            self._accept(topic, known[topic])
+    def _refuse(self, why: str) -> None:
+        kept = "the tree before it stays" if self._program else "there is no tree yet"
+        self._faults.note(_REFUSED, f"a behavior tree was refused ({kept}): {why}", severe=True)
+
+    def _try_candidate(self) -> None:
+        """Takes the candidate into use, unless its topics do not suit or have to show it yet."""
+        candidate = self._candidate
+        if candidate is None:
+            return
+        if self._program is not None:
+            short = candidate.inputs.too_short(self._latest)
+            if short:
+                self._discard_candidate()
+                self._refuse(f"{short}.")
+                self._subscribe()
+                return
+            if self._unheard(candidate):
+                return
+        self._candidate = None
+        self._install(candidate)
+        self._say_who_drives()
+
+    def _discard_candidate(self) -> None:
+        if self._candidate is not None:
+            self._preparation.retire(self._candidate)
+            self._candidate = None
+
+    def _unheard(self, program: TreeProgram) -> list[str]:
+        return [topic for topic in program.inputs.topics if topic not in self._latest]
+
+    def _install(self, program: TreeProgram) -> None:
+        """Takes a tree into use; the action that runs is interrupted, the history goes on."""
+        self._interrupt()
+        self._guard.release()
+        self._channels.follow(program.channels)
+        if self._program is not None:
+            self._preparation.retire(self._program)
+        self._program = program
+        self._subscribe()
+        for topic in self._latest:
+            self._accept(topic, quietly=True)
         self.get_logger().info(
-            f"running a tree of {nodes.size(learned.tree)} nodes that reads "
-            f"{', '.join(inputs.topics) or 'no state'}."
+            f"running a tree of {nodes.size(program.learned.tree)} nodes that reads "
+            f"{', '.join(program.inputs.topics) or 'no state'}."
         )
 
-    def _subscribe(self, inputs: TreeInputs) -> None:
-        for topic in self._subscriptions_by_topic.keys() - set(inputs.topics):
+    # --- what comes in ---
+
+    def _subscribe(self) -> None:
+        programs = [one for one in (self._program, self._candidate) if one is not None]
+        topics = {topic for one in programs for topic in one.inputs.topics}
+        for topic in self._subscriptions_by_topic.keys() - topics:
             self.destroy_subscription(self._subscriptions_by_topic.pop(topic))
-        for topic in inputs.topics:
-            if topic not in self._subscriptions_by_topic:
-                self._subscriptions_by_topic[topic] = self.create_subscription(
-                    Float64MultiArray, topic, partial(self._on_state, topic), _STATE_QOS
-                )
+            self._latest.pop(topic, None)
+        for topic in sorted(topics - self._subscriptions_by_topic.keys()):
+            self._subscriptions_by_topic[topic] = self.create_subscription(
+                Float64MultiArray, topic, partial(self._on_state, topic), _STATE_QOS
+            )
 
     def _on_state(self, topic: str, message: Float64MultiArray) -> None:
-        self._accept(topic, Message(message.data, self._now()))
+        # A message may still come on a topic that no tree reads any longer.
+        if topic not in self._subscriptions_by_topic:
+            return
+        self._latest[topic] = Message(message.data, self._now())
+        self._accept(topic)
+        self._try_candidate()
 
-    def _accept(self, topic: str, message: Message) -> None:
-        # A message may still come on a topic that the present tree does not read.
-        if self._inputs is None or topic not in self._inputs.topics:
+    def _accept(self, topic: str, *, quietly: bool = False) -> None:
+        if self._program is None or topic not in self._program.inputs.topics:
             return
         try:
-            self._inputs.accept(topic, message)
+            self._program.inputs.accept(topic, self._latest[topic])
         except BadMessageError as err:
-            self._faults.note(err.fault.value, str(err))
+            if not quietly:
+                self._faults.note(err.fault.value, str(err))
+
+    def _on_person(self, topic: str, message: String) -> None:
+        # Where commands were remapped to that topic, they are not a person's.
+        if self.resolve_topic_name(topic) in self._channels.topics:
+            return
+        if self._takeover.note(self._now()) and self._enabled and self._program is not None:
+            self.get_logger().info(f"a person has taken over on {topic}.")
+            self._interrupt()
+            self._channels.rest()
+            self._guard.release()
+        self._moving = self._enabled and self._program is not None
+        self._say_who_drives()
+        channels = self._program.channels if self._program else [topic]
+        channel = channel_of(topic, channels, self._settings.takeover.topics)
+        if message.data and channel is not None:
+            self._histories.setdefault(channel, ActionHistory()).take(message.data)
+
+    def _on_clock_set_back(self, _: TimeJump) -> None:
+        """What was received then is not from now: all topics are stale until they send again."""
+        self._latest.clear()
+        if self._program is not None:
+            self._program.inputs.forget()
+        self._takeover.restart(self._now())
+        # Time may stand still now, and the next tick be far away.
+        if self._enabled and not self._takeover.lasts(self._now()):
+            self._rest()
 
     def _note_result(self, text: str) -> None:
         self._faults.note(
@@ -196,67 +270,118 @@ class ExecutorNode(Node):
             "send 'success' or 'failure', or 'label:success' or 'label:failure'.",
         )
 
+    # --- what goes out ---
+
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        self._enabled = request.data
-        if not self._enabled:
-            self._rest()
+        if request.data:
+            self._enabled = True
+            self._guard.release()
+        else:
+            self._disable()
+        self._say_who_drives()
         response.success = True
         response.message = f"enabled: {self._condition()}." if self._enabled else "disabled."
         self.get_logger().info(response.message)
         return response
 
+    def _disable(self) -> None:
+        # A person who drives goes on to do so.
+        self._moving = self._moving and not self._takeover.lasts(self._now())
+        self._rest()
+        self._enabled = False
+
     def _tick(self) -> None:
-        if self._runtime is None or self._inputs is None or not self._enabled:
+        program, now = self._program, self._now()
+        if program is None or not self._enabled or self._takeover.lasts(now):
             return
-        if self._inputs.stale(self._now()):
+        self._say_who_drives()
+        if program.inputs.stale(now) or not self._is_familiar(program):
             self._rest()
             return
         began = time.perf_counter()
         self._resting = False
+        self._moving = True
         self._channels.begin_tick()
-        actions = self._runtime.tick(self._inputs.state()).actions
+        actions = program.runtime.tick(program.inputs.state()).actions
         self._ticks += 1
         self._commands += self._channels.send(actions)
         self._slowest = max(self._slowest, time.perf_counter() - began)
 
+    def _is_familiar(self, program: TreeProgram) -> bool:
+        if self._guard.holding:
+            return False
+        familiar = self._guard.passes(program.novelty, program.inputs.values)
+        if self._guard.departure is not None:
+            held = "" if familiar else ": the robot is held until a person takes over"
+            self._faults.note(
+                _NOVEL, f"the state is outside what was shown{held}: {self._guard.departure}."
+            )
+        return familiar
+
     def _rest(self) -> None:
-        """Halts the tree; what it commands next is sent, be it what it commanded last."""
-        if self._resting or self._runtime is None or self._inputs is None:
-            return
-        self._channels.begin_tick()
-        self._runtime.halt()
-        self._inputs.reset()
-        self._resting = True
+        """Halts the tree, and the robot; what is commanded next is sent, be it what was last."""
+        self._interrupt()
         self._channels.rest()
+        if self._moving and self._settings.halt_action:
+            self._channels.send_to_all(self._settings.halt_action)
+            for history in self._histories.values():
+                history.take(self._settings.halt_action)
+        self._moving = False
+
+    def _interrupt(self) -> None:
+        """Halts the tree."""
+        if self._program is not None and not self._resting:
+            self._channels.begin_tick()
+            self._program.runtime.halt()
+            self._program.inputs.reset()
+        self._resting = True
+
+    # --- what it says ---
+
+    def _say_who_drives(self) -> None:
+        """Tells others, above all the recorder, whether the robot is in the tree's hands."""
+        ready = self._enabled and self._program is not None
+        driving = ready and not self._takeover.lasts(self._now())
+        if driving != self._said_to_drive:
+            self._said_to_drive = driving
+            self._driving.publish(Bool(data=driving))
 
     def _now(self) -> int:
         return int(self._time.now().nanoseconds)
 
     def _condition(self) -> str:
         """What the executor does, or what it waits for."""
-        if self._runtime is None or self._inputs is None:
+        now = self._now()
+        if self._program is None:
             return "waiting for a tree"
         if not self._enabled:
             return "disabled"
-        stale = self._inputs.stale(self._now())
+        if self._simulated and now == 0:
+            return "waiting for /clock"
+        if self._takeover.lasts(now):
+            return "paused: a person has taken over"
+        stale = self._program.inputs.stale(now)
         if stale:
             ages = ", ".join(f"{topic} ({age})" for topic, age in stale.items())
             return f"waiting for state: {ages}"
+        if self._guard.holding:
+            return f"held until a person takes over: {self._guard.departure}"
         return "running"
 
     def _publish_snapshot(self) -> None:
         watchers = self._snapshot.get_subscription_count()
         newcomers, self._watchers = watchers > self._watchers, watchers
-        if self._runtime is None or not watchers:
+        if self._program is None or not watchers:
             return
-        tip = self._runtime.root.tip()
+        runtime = self._program.runtime
+        tip = runtime.root.tip()
         snapshot = json.dumps(
             {
                 "condition": self._condition().split(":")[0],
-                "status": self._runtime.root.status.name,
+                "status": runtime.root.status.name,
                 "tip": tip.name if tip else "",
                 "commands": self._channels.sent,
-                "nodes": self._runtime.snapshot(),
+                "nodes": runtime.snapshot(),
             },
             ensure_ascii=False,
         )
@@ -272,19 +397,25 @@ class ExecutorNode(Node):
             "ticks": self._ticks,
             "commands": self._commands,
             "longest tick (ms)": f"{self._slowest * 1e3:.1f}",
+            "takeovers": self._takeover.count,
             _REFUSED: 0,
+            _NOVEL: 0,
         }
         self._slowest = 0.0
-        if self._runtime is not None and self._inputs is not None:
-            learned = self._runtime.learned
+        if self._program is not None:
+            learned = self._program.learned
             values |= {
                 "nodes": nodes.size(learned.tree),
                 "actions": len(learned.actions),
                 "rows": learned.provenance.rows,
                 "own-history agreement": learned.provenance.figures.own_history_agreement,
+                "novelty": self._guard.departure or "none",
             }
-            stale = self._inputs.stale(self._now())
-            values |= {f"state of {one}": stale.get(one, "fresh") for one in self._inputs.topics}
+            stale = self._program.inputs.stale(self._now())
+            topics = self._program.inputs.topics
+            values |= {f"state of {one}": stale.get(one, "fresh") for one in topics}
+        if self._candidate is not None:
+            values["the next tree waits for"] = ", ".join(self._unheard(self._candidate))
         values |= self._faults.counts
         if self._faults.recent:
             return Report(Level.WARN, f"{condition}; {self._faults.recent}", values)
@@ -294,6 +425,13 @@ class ExecutorNode(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Runs the executor."""
+    # The thread that reads trees hands the interpreter over to a tick that is due.
+    sys.setswitchinterval(_HAND_OVER)
+    # A search through all that there is takes longer than a tick, and there is next to no garbage
+    # to be found, as trees are taken apart: it is made a hundred times less often.
+    young, middle, old = gc.get_threshold()
+    gc.set_threshold(young, middle, 100 * max(old, 1))
+    gc.freeze()
     lifetime.run(ExecutorNode, args)
 
 

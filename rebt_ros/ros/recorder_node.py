@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
@@ -15,7 +15,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.validate_topic_name import validate_topic_name
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
 from rebt_ros.demonstration.builder import StateTopic
@@ -24,16 +24,39 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.arrival import ArrivalOrder
+from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
+from rebt_ros.ros.losses import Losses
 from rebt_ros.ros.parameters import Parameters
 from rebt_ros.ros.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
 from rebt_ros.storage.recording import RecordingWriter
 
-#: Long enough that no message of a burst is lost while a row is written.
-_QUEUE: Final = 1000
+#: Long enough that no message of a burst is lost while the disk is slow.
+_QUEUE: Final = 5000
+
+#: An action that came so long after it was sent may belong to another state (seconds).
+_LATE: Final = 1.0
 
 #: A state topic is silent after this long without a message (seconds).
 _SILENT: Final = 2.0
+
+
+class _Fetched(CallbackGroup):
+    """Subscriptions whose messages a timer fetches, and for which no executor wakes up.
+
+    To wake an executor up costs many times what it costs to take a message.
+    """
+
+    def can_execute(self, entity: object) -> bool:
+        """Never."""
+        return False
+
+    def beginning_execution(self, entity: object) -> bool:
+        """Never."""
+        return False
+
+    def ending_execution(self, entity: object) -> None:
+        """Nothing has begun."""
 
 
 class RecorderNode(Node):
@@ -61,6 +84,18 @@ class RecorderNode(Node):
             "Names of the values of state topics, each entry as in 'state:front,left,right'; "
             "where a topic has none, its messages' layout labels name them, else their index.",
         )()
+        commands = declare.text(
+            "command_topic",
+            "command",
+            "String topic of the executor's commands, as a correction knows what they did before "
+            "it (with several action_topics: a topic below it for each); empty for none.",
+        )()
+        driving = declare.text(
+            "driving_topic",
+            "executor/driving",
+            "Bool topic on which the executor says whether it drives: what a person does while it "
+            "drives is a demonstration of its own; empty for none.",
+        )()
         directory = declare.directory(
             "demonstrations", "demonstrations", "Directory of the recordings; ~ is your home."
         )()
@@ -86,6 +121,15 @@ class RecorderNode(Node):
             1.0,
         )()
 
+        sync_period = declare.number(
+            "sync_period",
+            0.0,
+            "How often rows are made to survive a loss of power (seconds); 0.0 for only when a "
+            "demonstration ends.",
+            0.0,
+            3600.0,
+        )()
+
         def open_writer(features: tuple[Feature, ...]) -> Writer:
             writer = RecordingWriter(
                 directory, features, action_topics, sample_rate=sample_rate or None
@@ -104,24 +148,41 @@ class RecorderNode(Node):
         self._check_names([*state_topics, *action_topics])
         self._order = ArrivalOrder[Callable[[], object]](round(window * 1e9))
         self._received = dict.fromkeys(state_topics, 0)
+        self._messages = 0
+        self._lost = 0
+        self._losses = Losses([*state_topics, *action_topics])
+        self._reliable = [*action_topics, *(state_topics if reliability == "reliable" else ())]
         self._heard: dict[str, float] = {}
         self._reported = time.monotonic()
 
+        self._immediate = window == 0.0
+        waking = None if self._immediate else _Fetched()
         states, actions = QoSProfile(depth=_QUEUE), QoSProfile(depth=_QUEUE)
         if reliability == "sensor_data":
             states.reliability = ReliabilityPolicy.BEST_EFFORT
         self._sources: list[Subscription] = [
             *(
                 self.create_subscription(
-                    Float64MultiArray, topic, partial(self._on_state, topic), states
+                    Float64MultiArray,
+                    topic,
+                    partial(self._on_state, topic),
+                    states,
+                    callback_group=waking,
                 )
                 for topic in state_topics
             ),
             *(
-                self.create_subscription(String, topic, partial(self._on_action, topic), actions)
+                self.create_subscription(
+                    String,
+                    topic,
+                    partial(self._on_action, topic),
+                    actions,
+                    callback_group=waking,
+                )
                 for topic in action_topics
             ),
         ]
+        self._listen_to_executor(commands, driving, action_topics)
         # Of their own, because their answers wait for the messages received before.
         group = MutuallyExclusiveCallbackGroup()
         for name, kind, command in (
@@ -130,10 +191,16 @@ class RecorderNode(Node):
             ("~/discard_demonstration", Trigger, lambda _, stamp: self._session.discard(stamp)),
         ):
             self.create_service(kind, name, partial(self._serve, command), callback_group=group)
-        self._immediate = window == 0.0
         if not self._immediate:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(max(window / 2, 0.005), self._take_ready, clock=steady)
+        if sync_period:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self.create_timer(
+                sync_period,
+                lambda: self._session.sync(self._stamp(time.time_ns())),
+                clock=steady,
+            )
         self._diagnostics = Diagnostics(self, "recording", self._report)
         if start:
             self._session.start(self._stamp(time.time_ns()))
@@ -152,6 +219,32 @@ class RecorderNode(Node):
             log = self.get_logger().info if answer.success else self.get_logger().error
             log(answer.message)
 
+    def _listen_to_executor(self, commands: str, driving: str, channels: Sequence[str]) -> None:
+        """Subscribes to what tells demonstrations and corrections apart."""
+        shown = {self.resolve_topic_name(channel) for channel in channels}
+        for channel in channels if commands else ():
+            topic = topic_of(commands, channel, channels)
+            # A robot that was told to learn from itself is not corrected by itself.
+            if self.resolve_topic_name(topic) not in shown:
+                take = partial(self._on_command, channel)
+                self._sources.append(
+                    self.create_subscription(String, topic, take, QoSProfile(depth=_QUEUE))
+                )
+        if driving:
+            self._sources.append(
+                self.create_subscription(Bool, driving, partial(self._on_driving), DRIVING_QOS)
+            )
+
+    def _on_command(self, channel: str, message: String, info: dict[str, Any]) -> None:
+        received = _received(info)
+        stamp = self._stamp(received)
+        self._queue(received, partial(self._session.command, stamp, channel, message.data))
+
+    def _on_driving(self, message: Bool, info: dict[str, Any]) -> None:
+        received = _received(info)
+        stamp = self._stamp(received)
+        self._queue(received, partial(self._session.drive, stamp, message.data))
+
     def _check_names(self, topics: Sequence[str]) -> None:
         for topic in topics:
             validate_topic_name(topic)
@@ -165,16 +258,30 @@ class RecorderNode(Node):
     def _on_state(self, topic: str, message: Float64MultiArray, info: dict[str, Any]) -> None:
         self._received[topic] += 1
         self._heard[topic] = time.monotonic()
-        received = _received(info)
+        received = self._note(topic, info)
         labels = fields_of([one.label for one in message.layout.dim], len(message.data))
         stamp = self._stamp(received)
         self._queue(received, partial(self._session.observe, stamp, topic, message.data, labels))
 
     def _on_action(self, topic: str, message: String, info: dict[str, Any]) -> None:
-        received = _received(info)
+        received = self._note(topic, info)
+        late = (received - (info.get("source_timestamp") or received)) / 1e9
+        if late > _LATE:
+            self._faults.note(
+                "late action",
+                f"an action on {topic!r} came {late:.1f} s after it was sent and has the state of "
+                "its arrival: wait until recorder and publisher know each other, and check that "
+                "their clocks agree.",
+            )
         self._queue(
             received, partial(self._session.act, self._stamp(received), topic, message.data)
         )
+
+    def _note(self, topic: str, info: dict[str, Any]) -> int:
+        """Counts a message; returns when it was received, nanoseconds."""
+        self._messages += 1
+        self._losses.take(topic, info.get("publication_sequence_number"))
+        return _received(info)
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any
@@ -223,13 +330,27 @@ class RecorderNode(Node):
         simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
         return int(clock.now().nanoseconds) if simulated else received
 
+    def _count_losses(self) -> None:
+        for topic, count in self._losses.settle(self.count_publishers).items():
+            self._lost += count
+            if count and topic in self._reliable:
+                self._faults.note(
+                    "message lost",
+                    f"{count} messages on {topic!r} were lost within a second: publish less often, "
+                    "or with a deeper history.",
+                )
+
     def _report(self) -> Report:
         now = time.monotonic()
         elapsed, self._reported = now - self._reported, now
         session = self._session
+        self._count_losses()
         values: dict[str, object] = {
             "rows": session.rows,
             "rows lost": session.lost,
+            "takeovers": session.takeovers,
+            "messages": self._messages,
+            "messages lost": self._lost,
             "demonstration": session.writer.path if session.writer else "none yet",
             "rows of the demonstration": session.writer.rows if session.writer else 0,
         }

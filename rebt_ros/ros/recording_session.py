@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -13,6 +13,7 @@ from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import RebtError
+from rebt_ros.ros.takeover_watch import TakeoverWatch
 
 #: Kind of the fault that a row could not be written.
 WRITE_ERROR = "write error"
@@ -34,6 +35,9 @@ class Writer(Protocol):
 
     def write(self, row: Row) -> None:
         """Adds a row that is durable afterwards."""
+
+    def sync(self) -> None:
+        """Makes its rows survive a loss of power."""
 
     def close(self) -> None:
         """Ends the file."""
@@ -87,6 +91,7 @@ class RecordingSession:
         self._note = note
         # Refuses topics and rates that no demonstration can have, before one begins.
         DemonstrationBuilder(self._topics, self._channels, sample_rate)
+        self._watch = TakeoverWatch(self._channels)
         self._latest: dict[str, _Message] = {}
         # Topics whose last message was refused.
         self._unclear: set[str] = set()
@@ -100,6 +105,11 @@ class RecordingSession:
         """Rows that could not be written."""
         self.failure = ""
         """Why rows cannot be written at the moment; empty while they can."""
+
+    @property
+    def takeovers(self) -> int:
+        """How often a person has taken over from the executor."""
+        return self._watch.takeovers
 
     @property
     def recording(self) -> bool:
@@ -134,10 +144,24 @@ class RecordingSession:
 
     def act(self, stamp: int, channel: str, label: str) -> None:
         """Takes an action message (see `DemonstrationBuilder.act`)."""
+        before = self._watch.act(stamp, channel, label)
+        if before is not None and self.recording:
+            self._end()
+            self._begin(stamp, before)
         self._held[channel] = label
         if self._builder is not None:
             with self._noting_faults():
                 self._write(self._builder.act(stamp, channel, label))
+
+    def command(self, stamp: int, channel: str, label: str) -> None:
+        """Takes a command of the executor: what is held by a person ends with it."""
+        if self._watch.command(stamp, channel, label):
+            self._hand_over(stamp)
+
+    def drive(self, stamp: int, driving: bool) -> None:
+        """Takes note of whether the executor drives."""
+        if self._watch.drive(driving):
+            self._hand_over(stamp)
 
     def start(self, stamp: int) -> Answer:
         """Begins to record, with a new demonstration."""
@@ -183,9 +207,27 @@ class RecordingSession:
             True, f"discarded {_count(rows)} in {writer.path}; a new demonstration has begun."
         )
 
-    def _begin(self, stamp: int) -> None:
-        """Starts a demonstration that knows the present state, but none of the actions before."""
-        builder = DemonstrationBuilder(self._topics, self._channels, self._sample_rate)
+    def sync(self, stamp: int) -> None:
+        """Makes the rows written so far survive a loss of power."""
+        try:
+            if self._writer is not None:
+                self._writer.sync()
+        except RebtError as err:
+            # Whether the rows before are on the disk is not known: another file begins.
+            assert self._builder is not None
+            self._abandon(str(err))
+            self._begin(stamp)
+
+    def _hand_over(self, stamp: int) -> None:
+        """The executor drives from now on: no action is held by a person any more."""
+        self._held.clear()
+        if self.recording:
+            self._end()
+            self._begin(stamp)
+
+    def _begin(self, stamp: int, before: Mapping[str, Sequence[str]] | None = None) -> None:
+        """Starts a demonstration that knows the present state, and of the past only `before`."""
+        builder = DemonstrationBuilder(self._topics, self._channels, self._sample_rate, before)
         for topic, (when, values, labels) in self._latest.items():
             if topic in self._unclear:
                 continue

@@ -59,9 +59,9 @@ class TreeInputs:
         return tuple(self._encoder.topics)
 
     @property
-    def latest(self) -> Mapping[str, Message]:
-        """The newest message of each topic."""
-        return self._latest
+    def values(self) -> Mapping[str, Sequence[float]]:
+        """The values of the newest message of each topic."""
+        return {topic: message.values for topic, message in self._latest.items()}
 
     def accept(self, topic: str, message: Message) -> None:
         """Takes a message of one of the topics.
@@ -87,6 +87,20 @@ class TreeInputs:
                 )
         self._latest[topic] = message
 
+    def forget(self) -> None:
+        """Forgets all messages, as where the clock was set back: what it says of them is wrong."""
+        self._latest.clear()
+
+    def too_short(self, latest: Mapping[str, Message]) -> str:
+        """Which of the messages has too few values for the tree, in words; empty for none."""
+        for topic, needed in self._encoder.topics.items():
+            if topic in latest and len(latest[topic].values) < needed:
+                return (
+                    f"state topic {topic!r} sends {len(latest[topic].values)} values "
+                    f"where the tree reads {needed}"
+                )
+        return ""
+
     def stale(self, now: int) -> dict[str, str]:
         """The topics without a fresh message, and the age of their last one, in words."""
         stale: dict[str, str] = {}
@@ -104,7 +118,7 @@ class TreeInputs:
 
         To be called once per tick: lagged features look back at what it returned before.
         """
-        values = self._encoder.encode({topic: one.values for topic, one in self._latest.items()})
+        values = self._encoder.encode(self.values)
         for place, value in zip(self._read, values, strict=True):
             self._state[place] = value
         return self._state

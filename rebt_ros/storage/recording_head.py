@@ -1,0 +1,115 @@
+"""The first line of a recording: what its columns are and where they come from.
+
+It is the mark `# rebt_ros recording`, and JSON.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.errors import InputError
+
+#: The first one is text, see `recording_text`; the second one is written, see `recording_rows`.
+TEXT_VERSION: Final = 1
+VERSION: Final = 2
+
+#: What every recording begins with.
+MARK: Final = b"# rebt_ros recording "
+
+#: Longer first lines are refused, so that a file that is no recording is not read as a whole.
+LONGEST_LINE: Final = 1 << 24
+
+#: The rows of version 2 begin at a multiple of this many bytes.
+_ALIGNMENT: Final = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What the first line says."""
+
+    version: int
+    features: tuple[Feature, ...]
+    channels: tuple[str, ...]
+
+    @classmethod
+    def parse(cls, text: str) -> Head:
+        """Reads the JSON of the first line.
+
+        Raises:
+            ValueError: It is malformed; the message says how.
+        """
+        try:
+            values = json.loads(text)
+        except RecursionError as err:
+            raise ValueError("its JSON is nested too deeply") from err
+        if not isinstance(values, dict):
+            raise ValueError("its JSON is not an object")
+        version, features, channels = (
+            values.get(one) for one in ("version", "features", "channels")
+        )
+        if type(version) is not int or not TEXT_VERSION <= version <= VERSION:
+            raise ValueError(f"its version is {version!r}, not {TEXT_VERSION} or {VERSION}")
+        if not isinstance(features, list) or not isinstance(channels, list):
+            raise ValueError("it lists no features or no channels")
+        if not all(isinstance(one, str) for one in channels):
+            raise ValueError("a channel is not text")
+        if len(set(channels)) < len(channels):
+            raise ValueError("two channels have the same name")
+        read = tuple(map(_parse_feature, features))
+        if len({feature.name for feature in read}) < len(read):
+            raise ValueError("two features have the same name")
+        return cls(version, read, tuple(channels))
+
+
+def head_line(
+    features: Sequence[Feature], channels: Sequence[str], sample_rate: float | None
+) -> bytes:
+    """The first line of a recording of version 2."""
+    description = {
+        "version": VERSION,
+        "sample_rate": sample_rate,
+        "features": [
+            {"name": feature.name, "topic": feature.topic, "index": feature.index}
+            for feature in features
+        ],
+        "channels": list(channels),
+    }
+    line = MARK + json.dumps(description).encode()
+    return line + b" " * (-(len(line) + 1) % _ALIGNMENT) + b"\n"
+
+
+def read_head(path: Path, file: BinaryIO) -> Head:
+    """Reads the first line.
+
+    Raises:
+        InputError: It is not that of a recording, or of one that this version can read.
+    """
+    line = file.readline(LONGEST_LINE)
+    if not line.startswith(MARK) or not line.endswith(b"\n"):
+        raise InputError(f"{path} is not a recording: name one that the recorder wrote.")
+    try:
+        return Head.parse(line.removeprefix(MARK).decode())
+    except ValueError as err:
+        raise InputError(
+            f"{path} is a recording that cannot be read, because {err}: "
+            "use the version of rebt_ros that wrote it."
+        ) from err
+
+
+def _parse_feature(value: object) -> Feature:
+    if not isinstance(value, dict):
+        raise ValueError(f"{value!r} is not a feature")
+    name, topic, index = value.get("name"), value.get("topic"), value.get("index")
+    if not (
+        isinstance(name, str)
+        and isinstance(topic, str | None)
+        and isinstance(index, int | None)
+        and not isinstance(index, bool)
+    ):
+        raise ValueError(f"{value!r} is not a feature")
+    return Feature(name, topic=topic, index=index)

@@ -1,0 +1,119 @@
+"""What the tests of the executor share: a tree, a robot, and what the executor says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Sequence_
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ros_processes import LATCHED, Peer, values_of
+from std_msgs.msg import String
+
+from rebt_ros.behavior_tree.document import dumps
+from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
+from rebt_ros.behavior_tree.nodes import Action, Condition, Node, Selector, Sequence, actions
+from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.logic.conditions import Literal, Threshold
+
+GO, TURN, STOP = (Action(label, "action") for label in ("go", "turn", "stop"))
+
+
+def learned(tree: Node, topic: str | None = "state", *others: Action) -> LearnedTree:
+    """Features y and x; y, the first value of the state, is never tested."""
+    return LearnedTree(
+        tuple(
+            Feature(name, topic=topic, index=None if topic is None else index)
+            for index, name in enumerate(("y", "x"))
+        ),
+        (*actions(tree), *others),
+        tree,
+        Provenance(1, 10, 0.0, 5, 0.0, Root.SELECTOR, False, Figures(0, 1.0, 1.0, 2)),
+    )
+
+
+def where_x_is_small(small: Action, otherwise: Action) -> Node:
+    return Selector((Sequence((Condition(Literal(Threshold("x", 0.5))), small)), otherwise))
+
+
+READS_X = learned(where_x_is_small(GO, TURN))
+
+
+def status(peer: Peer, condition: str, *, robot: Any = None, **values: str) -> Any:
+    """Waits until the executor reports a condition; a robot sends its state meanwhile."""
+
+    def reported() -> Any:
+        latest = peer.diagnostics.get("executor: execution")
+        if latest is None or values_of(latest)["condition"] != condition:
+            return None
+        found = values_of(latest)
+        keys = {key.replace("_", " "): value for key, value in values.items()}
+        return latest if all(found.get(key) == value for key, value in keys.items()) else None
+
+    return (robot.until if robot else peer.wait_until)(
+        reported, what=f"the condition {condition!r}"
+    )
+
+
+class Robot:
+    """Publishes a state all the time and hears the commands."""
+
+    def __init__(self, peer: Peer) -> None:
+        self._peer = peer
+        self.state = (7.0, 0.0)
+        self.commands = peer.listen(String, "command")
+
+    def until(self, condition: Any, what: str = "") -> Any:
+        def published() -> Any:
+            self._peer.state(*self.state)
+            return condition()
+
+        return self._peer.wait_until(published, what=what)
+
+    def obeys(self, label: str) -> None:
+        """Waits for a command that is sent from now on."""
+        seen = len(self.commands)
+        self.until(
+            lambda: any(one.data == label for one in self.commands[seen:]), f"command {label!r}"
+        )
+
+
+def publish(peer: Peer, tree: LearnedTree | str) -> None:
+    document = tree if isinstance(tree, str) else dumps(tree)
+    peer.connect(String, "behavior_tree", LATCHED).publish(String(data=document))
+
+
+def shown(tree: LearnedTree, *leaves: Sequence_[tuple[float, float]]) -> LearnedTree:
+    """The tree with what it was learned from: of each leaf, the ranges of y and x."""
+    ranges = tuple(ShownLeaf(10, tuple(Span(*span) for span in leaf)) for leaf in leaves)
+    return replace(tree, shown=(ShownChannel("action", ranges),))
+
+
+def large(nodes: int, only: Action) -> LearnedTree:
+    """A tree of about so many nodes that does one thing, and finds that out at once."""
+    never = [
+        Sequence((*(Condition(Literal(Threshold("x", -1.0 - one))) for _ in range(8)), STOP))
+        for one in range(nodes // 10)
+    ]
+    return learned(Selector((where_x_is_small(only, only), *never)))
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A command and when it was sent and received, nanoseconds."""
+
+    label: str
+    sent: int
+    received: int
+
+
+def timed_commands(peer: Peer, topic: str = "command") -> list[Sent]:
+    """A list to which the commands are added."""
+    heard: list[Sent] = []
+
+    def note(message: String, info: dict[str, Any]) -> None:
+        heard.append(Sent(message.data, info["source_timestamp"], info["received_timestamp"]))
+
+    peer.node.create_subscription(String, topic, note, 10_000)
+    peer.wait_until(lambda: peer.node.count_publishers(topic), what=f"a publisher of {topic}")
+    return heard

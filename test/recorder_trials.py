@@ -1,0 +1,250 @@
+"""Trials of the recorder under load and faults: short for tests, long for figures."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import select
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from load_publisher import ACTIONS
+from ros_processes import CHECKOUT, NodeProcess, Peer, own_domain, values_of
+
+from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.storage.recording import is_recording, read_recording
+
+RECORDER = "recorder: recording"
+
+
+class Load:
+    """`load_publisher` as a process.
+
+    Args:
+        domain: ROS domain id.
+        state_rate: States per second.
+        action_rate: Actions per second.
+        width: Values of a state.
+        seconds: How long it publishes; 0 for until it is stopped.
+    """
+
+    def __init__(
+        self, domain: int, state_rate: int, action_rate: int, width: int, seconds: float = 0
+    ) -> None:
+        self.every = state_rate // action_rate
+        numbers = map(str, (state_rate, action_rate, width, seconds))
+        self.process = subprocess.Popen(
+            [sys.executable, str(CHECKOUT / "test" / "load_publisher.py"), *numbers],
+            env=dict(
+                os.environ, ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST"
+            ),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+
+    def sent(self) -> dict[str, int] | None:
+        """How many states and actions it sent, once it has ended."""
+        assert self.process.stdout is not None
+        if not select.select([self.process.stdout], [], [], 0)[0]:
+            return None
+        counts: dict[str, int] = json.loads(self.process.stdout.readline())
+        return counts
+
+    def __enter__(self) -> Load:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+
+@dataclass
+class Killing:
+    """What a series of kills showed."""
+
+    kills: int = 0
+    before_a_row: int = 0
+    """Kills before the recorder had counted a row."""
+    acknowledged: int = 0
+    """Rows that the recorders had counted on /diagnostics."""
+    readable: int = 0
+    """Rows that were read afterwards."""
+    lost: int = 0
+    """Acknowledged rows that could not be read."""
+    gaps: int = 0
+    """Rows whose action is not the one that follows that of the row before."""
+    torn: int = 0
+    """Tails that were torn, by the kill or by us after it."""
+    noticed: int = 0
+    """Torn tails that were left out with a note."""
+    files: int = 0
+
+
+def kill_recorders(kills: int, directory: Path, chance: random.Random) -> Killing:
+    """Kills one recorder after another at random moments, every fourth one while it starts.
+
+    Each one begins in the directory that the others left.  Every second tail is torn further, by
+    a part of a row as a loss of power leaves it.
+
+    Args:
+        kills: How many.
+        directory: Working directory.
+        chance: Chooses the moments.
+    """
+    result = Killing()
+    demonstrations = directory / "demonstrations"
+    with own_domain() as domain, Peer(domain) as peer, Load(domain, 1000, 50, 24):
+        for number in range(kills):
+            peer.diagnostics.clear()
+            seen = set(demonstrations.glob("*"))
+            with NodeProcess("recorder_node", domain, directory) as recorder:
+                if number % 4 < 3:
+                    peer.wait_until(lambda: _acknowledged(peer), 60, "a row on /diagnostics")
+                _pass(peer, chance.uniform(0, 2.5))
+                recorder.stop(signal.SIGKILL)
+                _pass(peer, 0.2)
+            acknowledged = _acknowledged(peer)
+            files = [one for one in set(demonstrations.glob("*")) - seen if is_recording(one)]
+            result.kills += 1
+            result.before_a_row += not acknowledged
+            result.acknowledged += acknowledged
+            _examine(files, acknowledged, bool(number % 2), result)
+    return result
+
+
+def _acknowledged(peer: Peer) -> int:
+    """Rows that the recorder has counted on /diagnostics."""
+    status = peer.diagnostics.get(RECORDER)
+    return int(values_of(status)["rows"]) if status else 0
+
+
+def _examine(files: list[Path], acknowledged: int, tear: bool, result: Killing) -> None:
+    readable = 0
+    for path in files:
+        whole = read_recording(path)
+        if tear:
+            with path.open("ab") as file:
+                file.write(path.read_bytes()[-100:])
+        read = read_recording(path)
+        torn = tear or bool(whole.notes)
+        result.torn += torn
+        result.noticed += torn and "its last row is incomplete and left out" in read.notes
+        result.gaps += gaps(read.demonstration)
+        result.files += 1
+        readable += len(read.demonstration)
+    result.readable += readable
+    result.lost += max(0, acknowledged - readable)
+
+
+def gaps(demonstration: Demonstration) -> int:
+    """How often a row's action is not the one that was sent after that of the row before."""
+    place = {label: number for number, label in enumerate(ACTIONS)}
+    turn = np.array([place[label] for label in demonstration.actions])[demonstration.chosen]
+    return int((np.diff(turn) % len(ACTIONS) != 1).sum())
+
+
+def misplaced(demonstration: Demonstration, every: int) -> int:
+    """How many rows do not have the state that was sent just before their action."""
+    expected = every * np.arange(len(demonstration))
+    return int((demonstration.states[:, 0] != expected).sum())
+
+
+@dataclass
+class Loading:
+    """What a recorder did under load."""
+
+    seconds: float
+    states: int
+    """Sent."""
+    actions: int
+    """Sent."""
+    messages: int
+    """Received."""
+    rows: int
+    gaps: int
+    misplaced: int
+    """Rows without the state that was sent just before their action."""
+    lost_messages: int
+    faults: list[str]
+    memory: list[float] = field(default_factory=list)
+    """Resident memory at each second (MB)."""
+    cpu: float = 0.0
+    """Share of one core."""
+
+
+def load_recorder(
+    seconds: float,
+    directory: Path,
+    state_rate: int = 2000,
+    action_rate: int = 100,
+    width: int = 24,
+) -> Loading:
+    """Lets a recorder record at a high rate, and compares what was sent with what was written."""
+    with (
+        own_domain() as domain,
+        Peer(domain) as peer,
+        NodeProcess("recorder_node", domain, directory) as recorder,
+    ):
+        recorder.says("recording ")
+        memory: list[float] = []
+        with Load(domain, state_rate, action_rate, width, seconds) as load:
+            last: list[object] = [None]
+
+            def ended() -> dict[str, int] | None:
+                status = peer.diagnostics.get(RECORDER)
+                if status is not last[0]:
+                    last[0] = status
+                    memory.append(_resident(recorder.process.pid))
+                return load.sent()
+
+            sent = peer.wait_until(ended, seconds * 3 + 30, "the end of the load")
+            peer.wait_until(
+                lambda: (
+                    int(values_of(peer.diagnostics[RECORDER])["rows"]) >= sent["actions"]
+                    and peer.diagnostics[RECORDER] is not last[0]
+                ),
+                10,
+                "the last row",
+            )
+            values = values_of(peer.diagnostics[RECORDER])
+            cpu = cpu_seconds(recorder.process.pid) / seconds
+        assert recorder.stop() == 0
+        known = ("rows lost", "messages lost", "message lost", "write error")
+        (path,) = (directory / "demonstrations").iterdir()
+        demonstration = read_recording(path).demonstration
+        return Loading(
+            seconds,
+            sent["states"],
+            sent["actions"],
+            int(values["messages"]),
+            len(demonstration),
+            gaps(demonstration),
+            misplaced(demonstration, load.every),
+            int(values["messages lost"]),
+            [f"{name}: {values[name]}" for name in known if values.get(name, "0") != "0"],
+            memory,
+            cpu,
+        )
+
+
+def _pass(peer: Peer, seconds: float) -> None:
+    """Takes messages for so long; the moment is the trial, not a wait for something."""
+    try:
+        peer.wait_until(lambda: False, seconds)
+    except TimeoutError:
+        return
+
+
+def _resident(pid: int) -> float:
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def cpu_seconds(pid: int) -> float:
+    ticks = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")

@@ -1,0 +1,146 @@
+"""Corrections: a robot fails, a person takes over, and after a relearn it succeeds by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from executor_examples import status
+from ros_processes import NodeProcess, Peer, values_of
+from std_msgs.msg import String
+
+from rebt_ros.storage.inputs import load
+
+FIELDS = ("place", "door")
+GOAL = 2.0
+DOOR = 1.0
+
+PARAMETERS = {"last_action": "never", "psa": "never", "ccp_alpha": 0.0}
+
+
+class Corridor:
+    """A robot that drives to a goal and grips what is there; its way may lead through a door."""
+
+    def __init__(self, closed: bool) -> None:
+        self.place = 0.0
+        self.left_to_open = 8 if closed else 0
+        self.gripped = False
+
+    @property
+    def state(self) -> tuple[float, float]:
+        """Where it is, and whether it stands before a closed door."""
+        return self.place, float(self.place == DOOR and self.left_to_open > 0)
+
+    def obey(self, label: str) -> None:
+        before_door = self.state[1] == 1.0
+        if label == "forward" and not before_door:
+            self.place = min(round(self.place + 0.1, 1), GOAL)
+        elif label == "open" and before_door:
+            self.left_to_open -= 1
+        elif label == "grip" and self.place == GOAL:
+            self.gripped = True
+
+
+def show(state: tuple[float, float]) -> str:
+    """What a person does."""
+    place, door = state
+    return "open" if door else "grip" if place == GOAL else "forward"
+
+
+class Course:
+    """Lets the executor's commands, or a person, move the robot."""
+
+    def __init__(self, peer: Peer) -> None:
+        self._peer = peer
+        self.robot = Corridor(closed=False)
+        self.commands: list[str] = []
+        peer.node.create_subscription(String, "command", self._on_command, 1000)
+
+    def begin(self, *, closed: bool) -> None:
+        self.robot = Corridor(closed)
+        self.commands.clear()
+
+    def until(self, condition: Callable[[], Any], what: str = "") -> Any:
+        def moved() -> Any:
+            self._peer.state(*self.robot.state, labels=FIELDS)
+            return condition()
+
+        return self._peer.wait_until(moved, what=what)
+
+    def demonstrate(self, condition: Callable[[], bool]) -> int:
+        """A person drives until the condition holds; returns how many actions that took."""
+        done = 0
+        while not condition():
+            state = self.robot.state
+            self._peer.state(*state, labels=FIELDS)
+            self._peer.action(show(state))
+            self.robot.obey(show(state))
+            self._peer.spin_once()
+            done += 1
+        return done
+
+    def _on_command(self, message: String) -> None:
+        self.commands.append(message.data)
+        self.robot.obey(message.data)
+
+
+@pytest.mark.parametrize("novelty", ["ignore", "hold"])
+def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
+    domain: int, peer: Peer, tmp_path: Path, novelty: str
+) -> None:
+    executing = {
+        "rate": 50.0,
+        "takeover_timeout": 0.5,
+        "novelty": novelty,
+        "halt_action": "wait" if novelty == "hold" else "",
+    }
+    with (
+        NodeProcess("recorder_node", domain, tmp_path),
+        NodeProcess("learner_node", domain, tmp_path, PARAMETERS),
+        NodeProcess("executor_node", domain, tmp_path, executing),
+    ):
+        course = Course(peer)
+        shown = course.demonstrate(lambda: course.robot.gripped)
+        answer = peer.call("/learner/relearn")
+        assert f"{shown} rows of 1 demonstration" in answer.message
+        assert peer.call("/executor/enable", True).success
+
+        # It goes where it was shown, and stands before the door.
+        course.until(lambda: course.robot.gripped, "the goal")
+        course.begin(closed=True)
+        course.until(lambda: course.robot.state == (DOOR, 1.0), "the door")
+        if novelty == "hold":
+            course.until(lambda: course.commands[-1] == "wait", "being held")
+            said = status(peer, "held until a person takes over", robot=course)
+            assert values_of(said)["novelty"].startswith("door is 1, 1 above the 0 to 0")
+            assert course.commands[-1] == "wait"
+        else:
+            course.commands.clear()
+            course.until(lambda: len(course.commands) > 50, "fifty commands")
+            assert set(course.commands) == {"forward"}
+        assert course.robot.left_to_open == 8
+
+        # A person opens it, and the robot goes on by itself.
+        corrected = course.demonstrate(lambda: course.robot.left_to_open == 0)
+        course.until(lambda: course.robot.gripped, "the goal")
+        assert peer.call("/recorder/record", False).success
+
+        # What the person did is a demonstration of its own, with what the robot had done before.
+        first, second = load([tmp_path / "demonstrations"]).demonstrations
+        assert (len(first), len(second)) == (shown, corrected)
+        assert first.before == {}
+        assert second.actions == ("open",)
+        assert second.before == {"action": "wait" if novelty == "hold" else "forward"}
+
+        answer = peer.call("/learner/relearn")
+        assert f"{shown + corrected} rows of 2 demonstrations" in answer.message
+        status(peer, "running", robot=course, rows=str(shown + corrected))
+        course.begin(closed=True)
+        course.until(lambda: course.robot.gripped, "the goal")
+        assert "open" in course.commands
+        assert "wait" not in course.commands

@@ -1,0 +1,466 @@
+"""What the executor promises under load, faults and a person's hand, over real DDS.
+
+Each test fails when the protection that it names is taken away.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from executor_examples import (
+    GO,
+    READS_X,
+    STOP,
+    TURN,
+    Robot,
+    large,
+    learned,
+    publish,
+    shown,
+    status,
+    timed_commands,
+    where_x_is_small,
+)
+from ros_processes import NodeProcess, Peer, values_of
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Bool, Float64MultiArray, String
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.document import dumps
+from rebt_ros.behavior_tree.nodes import Condition, Selector, Sequence
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.logic.conditions import LastActionIs, Literal
+
+
+def _labels(commands: list[Any]) -> list[str]:
+    return [one.label if hasattr(one, "label") else one.data for one in commands]
+
+
+# --- halting ----------------------------------------------------------------------------------
+
+
+def test_the_halt_action_is_sent_once_whenever_the_tree_is_halted(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    parameters = {"rate": 100.0, "state_timeout": 0.3, "halt_action": "halt"}
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        publish(peer, READS_X)
+        robot = Robot(peer)
+        # Nothing to halt, as nothing was commanded.
+        assert peer.call("/executor/enable", True).success
+        assert peer.call("/executor/enable", False).success
+        assert peer.call("/executor/enable", True).success
+        robot.obeys("go")
+        # The state goes stale.
+        peer.wait_until(lambda: robot.commands[-1].data == "halt")
+        status(peer, "waiting for state")
+        robot.obeys("go")
+        assert peer.call("/executor/enable", False).success
+        status(peer, "disabled")
+        robot.until(lambda: robot.commands[-1].data == "halt")
+        labels = _labels(robot.commands)
+        assert labels.count("halt") == 2
+        assert labels[-1] == "halt"
+
+
+# --- disabling --------------------------------------------------------------------------------
+
+
+def _note_answers(peer: Peer, received: list[int]) -> None:
+    """Notes when the middleware received the answer of each service that the peer calls."""
+    executor: Any = peer._executor
+
+    def take(client: Any) -> Any:
+        with client.handle:
+            header, response = client.handle.take_response(client.srv_type.Response)
+
+        async def finish() -> None:
+            if header is not None:
+                received.append(header.received_timestamp)
+                client.get_pending_request(header.request_id.sequence_number).set_result(response)
+
+        return finish
+
+    executor._take_client = take
+
+
+def test_no_command_is_received_after_the_answer_to_a_disabling_call_under_load(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True, "rate": 1000.0}):
+        publish(peer, READS_X)
+        robot = Robot(peer)
+        commands = timed_commands(peer)
+        received: list[int] = []
+        _note_answers(peer, received)
+        for _ in range(10):
+            seen = len(commands)
+            robot.until(lambda seen=seen: len(commands) > seen + 20)
+            call = peer.begin("/executor/enable", False)
+            robot.until(call.done)
+            answered = received[-1]
+            # Enough for a tick that should not have come, and what was under way is here as well.
+            end = time.monotonic() + 0.02
+            robot.until(lambda end=end: time.monotonic() > end)
+            assert not [one for one in commands if max(one.sent, one.received) > answered]
+            assert peer.call("/executor/enable", True).success
+
+
+# --- swapping ---------------------------------------------------------------------------------
+
+
+class SimulatedTime:
+    """Moves /clock, with a fresh state at every step unless told otherwise."""
+
+    def __init__(self, peer: Peer, commands: list[Any]) -> None:
+        self._peer = peer
+        self._commands = commands
+        self.now = 0
+
+    def set(self, nanoseconds: int) -> None:
+        self.now = nanoseconds
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = divmod(nanoseconds, 10**9)
+        self._peer.publish(message, "/clock")
+
+    def step(self, milliseconds: int = 10) -> None:
+        self.set(self.now + milliseconds * 10**6)
+
+    def until(self, condition: Callable[[], Any], what: str = "") -> Any:
+        """Waits with a state that is sent again and again, while time stands still."""
+
+        def published() -> Any:
+            self._peer.state(7.0, 0.0)
+            return condition()
+
+        return self._peer.wait_until(published, what=what)
+
+    def commanded(self) -> None:
+        """Steps until the first command; from then on, a step is a tick."""
+        self.set(10**9)
+        seen = len(self._commands)
+
+        def stepped() -> bool:
+            self._peer.state(7.0, 0.0)
+            self.step()
+            return len(self._commands) > seen
+
+        self._peer.wait_until(stepped, what="the first command")
+        # What those steps have set off has come when the executor says how many there were.
+        self._peer.diagnostics.clear()
+        said = status(self._peer, "running")
+        self._peer.wait_until(lambda: len(self._commands) >= int(values_of(said)["commands"]))
+
+
+def test_swapping_under_load_neither_misses_nor_doubles_a_command(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    parameters = {"enabled": True, "rate": 100.0, "use_sim_time": True}
+    trees = [dumps(large(200, action)) for action in (GO, TURN)]
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        publish(peer, trees[1])
+        commands = timed_commands(peer)
+        clock = SimulatedTime(peer, commands)
+        clock.commanded()
+        swaps = 0
+        while swaps < 40:
+            if commands[-1].label == (GO, TURN)[swaps % 2 - 1].label:
+                publish(peer, trees[swaps % 2])
+                swaps += 1
+            before = len(commands)
+            peer.state(7.0, 0.0)
+            clock.step()
+            peer.wait_until(lambda before=before: len(commands) > before, what="a command")
+            assert len(commands) == before + 1
+        peer.diagnostics.clear()
+        said = values_of(status(peer, "running"))
+        assert said["ticks"] == said["commands"] == str(len(commands))
+
+
+def test_swapping_large_trees_leaves_no_gap_beyond_a_tick(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    """Reading and building such a tree takes several ticks on any machine."""
+    period = 0.02
+    documents = [dumps(large(2000, action)) for action in (GO, TURN)]
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True, "rate": 1 / period}):
+        publish(peer, documents[0])
+        robot = Robot(peer)
+        commands = timed_commands(peer)
+
+        def largest_gap() -> float:
+            first = len(commands)
+            for document, action in ((documents[1], TURN), (documents[0], GO)) * 2:
+                publish(peer, document)
+                robot.obeys(action.label)
+            sent = [one.sent for one in commands[first:]]
+            return max(b - a for a, b in pairwise(sent)) / 1e9
+
+        robot.obeys("go")
+        # A busy machine may well delay a tick, but not in each of several attempts.
+        gaps: list[float] = []
+        while not gaps or (min(gaps) >= 2 * period and len(gaps) < 5):
+            gaps.append(largest_gap())
+        assert min(gaps) < 2 * period, gaps
+
+
+def test_a_swap_to_the_same_command_does_not_send_it_again_where_changes_are_sent(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    parameters = {"enabled": True, "rate": 100.0, "publish": "on_change"}
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        publish(peer, READS_X)
+        robot = Robot(peer)
+        robot.obeys("go")
+        for size in (50, 60, 70):
+            tree = large(size, GO)
+            publish(peer, tree)
+            status(peer, "running", robot=robot, nodes=str(nodes.size(tree.tree)))
+        publish(peer, learned(where_x_is_small(TURN, GO)))
+        robot.obeys("turn")
+        assert _labels(robot.commands) == ["go", "turn"]
+
+
+def test_a_tree_whose_topic_has_too_few_values_is_refused_and_the_old_one_goes_on(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    def reading(topic: str, index: int) -> str:
+        tree = where_x_is_small(STOP, TURN)
+        features = (Feature("x", topic=topic, index=index),)
+        return dumps(replace(learned(tree), features=features))
+
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}) as executor:
+        publish(peer, READS_X)
+        robot = Robot(peer)
+        robot.obeys("go")
+        publish(peer, reading("state", 5))
+        status(peer, "running", robot=robot, refused_trees="1")
+        executor.says("state topic 'state' sends 2 values where the tree reads 6")
+        robot.obeys("go")
+        # Of a topic that is new nothing is known before it sends.
+        publish(peer, reading("other", 2))
+        robot.until(
+            lambda: (
+                (one := peer.diagnostics.get("executor: execution"))
+                and values_of(one).get("the next tree waits for") == "other"
+            )
+        )
+        robot.obeys("go")
+
+        other = peer.connect(Float64MultiArray, "other")
+
+        def refused() -> Any:
+            other.publish(Float64MultiArray(data=[0.0]))
+            one = peer.diagnostics["executor: execution"]
+            return values_of(one)["refused trees"] == "2"
+
+        robot.until(refused)
+        said = peer.diagnostics["executor: execution"].message
+        assert "state topic 'other' sends 1 values where the tree reads 3" in said
+        robot.obeys("go")
+        assert set(_labels(robot.commands)) == {"go"}
+        publish(peer, reading("other", 2))
+
+        def fits() -> bool:
+            other.publish(Float64MultiArray(data=[0.0, 0.0, 0.0]))
+            return robot.commands[-1].data == "stop"
+
+        peer.wait_until(fits)
+
+
+# --- a person takes over ----------------------------------------------------------------------
+
+
+def test_a_person_pauses_the_tree_which_knows_afterwards_what_was_done(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    after_wave = Condition(Literal(LastActionIs("wave", ("go",))))
+    wave = replace(GO, label="wave")
+    tree = learned(
+        Selector((Sequence((after_wave, GO)), where_x_is_small(TURN, GO))), "state", wave
+    )
+    parameters = {"enabled": True, "rate": 100.0, "takeover_timeout": 0.3, "halt_action": "halt"}
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        publish(peer, tree)
+        robot = Robot(peer)
+        commands = timed_commands(peer)
+        driving = peer.listen(Bool, "/executor/driving", 10)
+        robot.obeys("turn")
+
+        def waving() -> Any:
+            peer.action("wave")
+            return (one := peer.diagnostics.get("executor: execution")) and values_of(one)[
+                "condition"
+            ] == "paused"
+
+        robot.until(waving, "a pause")
+        paused = len(commands)
+        peer.diagnostics.clear()
+        robot.until(waving, "the same pause")
+        last = time.time_ns()
+        assert len(commands) == paused
+        robot.until(lambda: len(commands) > paused)
+        # The person's hand is not halted.
+        assert "halt" not in _labels(commands)
+        assert commands[paused].label == "go"
+        assert commands[paused].sent - last > 0.2e9
+        robot.until(lambda: driving and driving[-1].data)
+        assert [one.data for one in driving][-2:] == [False, True]
+        status(peer, "running", robot=robot, takeovers="1")
+
+
+def test_nobody_takes_over_where_that_is_turned_off_or_the_commands_are_remapped_there(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    parameters = {"enabled": True, "rate": 100.0, "takeover_topics": ["hand"]}
+    arguments = ["-r", "command:=hand"]
+    with NodeProcess("executor_node", domain, tmp_path, parameters, arguments):
+        publish(peer, READS_X)
+        own = peer.listen(String, "hand")
+        robot = Robot.__new__(Robot)
+        robot._peer, robot.state, robot.commands = peer, (7.0, 0.0), own
+        robot.until(lambda: len(own) > 50, "commands that are no takeover")
+        assert values_of(status(peer, "running", robot=robot))["takeovers"] == "0"
+
+
+def test_a_robot_that_a_person_leaves_where_the_tree_cannot_drive_is_halted(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    parameters = {
+        "enabled": True,
+        "rate": 100.0,
+        "takeover_timeout": 0.2,
+        "state_timeout": 0.5,
+        "halt_action": "halt",
+    }
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        publish(peer, READS_X)
+        robot = Robot(peer)
+        robot.obeys("go")
+        peer.wait_until(lambda: robot.commands[-1].data == "halt")
+        # The tree rests; a person moves the robot and goes away.
+        peer.action("wave")
+        peer.wait_until(lambda: _labels(robot.commands).count("halt") == 2)
+
+
+# --- the clock --------------------------------------------------------------------------------
+
+
+def test_the_clock_may_jump_either_way(domain: int, peer: Peer, tmp_path: Path) -> None:
+    parameters = {
+        "enabled": True,
+        "rate": 100.0,
+        "use_sim_time": True,
+        "state_timeout": 0.5,
+        "halt_action": "halt",
+    }
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        publish(peer, READS_X)
+        commands = timed_commands(peer)
+        status(peer, "waiting for /clock")
+        clock = SimulatedTime(peer, commands)
+        clock.commanded()
+        running = len(commands)
+
+        # Forwards: what is known of the state is old, and hours of ticks do not come at once.
+        clock.set(clock.now + 3600 * 10**9)
+        peer.wait_until(lambda: _labels(commands)[-1] == "halt", what="the halt action")
+        for _ in range(20):
+            clock.step()
+        status(peer, "waiting for state")
+        assert _labels(commands)[running:] == ["halt"]
+
+        def ticks_with_state() -> None:
+            before = len(commands)
+            peer.diagnostics.clear()
+            clock.until(lambda: "executor: execution" in peer.diagnostics)
+            for number in range(1, 11):
+                clock.step()
+                peer.wait_until(lambda n=number: len(commands) >= before + n, what="a command")
+            assert _labels(commands)[before:] == ["go"] * 10
+
+        ticks_with_state()
+
+        # Backwards, and on past the moments at which states came before.
+        then, came = clock.now, len(commands)
+        clock.set(then - 2 * 10**8)
+        peer.wait_until(lambda: _labels(commands)[-1] == "halt", what="the halt action")
+        while clock.now < then + 10**8:
+            clock.step()
+        status(peer, "waiting for state")
+        assert _labels(commands)[came:] == ["halt"]
+        ticks_with_state()
+
+
+# --- outside of what was shown ----------------------------------------------------------------
+
+FAMILIAR = shown(READS_X, ((7.0, 7.0), (0.0, 0.5)), ((7.0, 7.0), (0.6, 1.0)))
+
+
+@pytest.mark.parametrize(
+    ("state", "why"),
+    [
+        ((7.0, 3.0), "x is 3, 2 above the 0.6 to 1 that was shown in such a state"),
+        # The tree does not test it, because it was always the same.
+        ((5.0, 0.0), "y is 5, 2 below the 7 to 7 that was shown in such a state"),
+    ],
+)
+def test_the_robot_is_held_outside_of_what_was_shown_until_a_person_takes_over(
+    domain: int, peer: Peer, tmp_path: Path, state: tuple[float, float], why: str
+) -> None:
+    parameters = {
+        "enabled": True,
+        "rate": 100.0,
+        "novelty": "hold",
+        "halt_action": "halt",
+        "takeover_timeout": 0.2,
+    }
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        publish(peer, FAMILIAR)
+        robot = Robot(peer)
+        robot.obeys("go")
+        robot.state = state
+        robot.obeys("halt")
+        held = len(robot.commands)
+        said = status(peer, "held until a person takes over", robot=robot, novelty=why)
+        assert why in said.message
+        assert int.from_bytes(said.level, "big") == 1
+        # Also where the state is a known one again.
+        robot.state = (7.0, 0.0)
+        peer.diagnostics.clear()
+        robot.until(lambda: "executor: execution" in peer.diagnostics)
+        held_still = {"states_outside_what_was_shown": "1"}
+        status(peer, "held until a person takes over", robot=robot, **held_still)
+        assert len(robot.commands) == held
+        peer.action("wave")
+        robot.obeys("go")
+
+
+def test_a_state_outside_of_what_was_shown_is_counted_and_reported_while_the_tree_goes_on(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True, "rate": 50.0}):
+        publish(peer, FAMILIAR)
+        robot = Robot(peer)
+        robot.obeys("go")
+        robot.state = (7.0, 3.0)
+        robot.obeys("turn")
+
+        def reported() -> Any:
+            one = peer.diagnostics.get("executor: execution")
+            return one if one and values_of(one)["novelty"].startswith("x is 3, 2 above") else None
+
+        said = robot.until(reported)
+        assert int(values_of(said)["states outside what was shown"]) > 0
+        assert values_of(said)["condition"] == "running"
+        assert int.from_bytes(said.level, "big") == 1
+        assert "the state is outside what was shown: x is 3" in said.message
