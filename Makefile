@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench-reduction experiment fuzz soak lint format clean
+.PHONY: help setup build demo test bench-reduction bench-recorder experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -47,6 +47,10 @@ test: build ## Run the tests on the built package.
 
 bench-reduction: setup ## Compare the sizes of BT-Espresso's trees and ours (ARGS="..." for options).
 	@$(VENV_PYTHON) -m rebt_ros.commands.bench_reduction ../shared/experiments $(ARGS)
+
+bench-recorder: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+bench-recorder: setup ## Kill, load and measure the recorder (KILLS=50; ARGS="..." for options).
+	@PYTHONPATH=.:test:$$PYTHONPATH $(VENV_PYTHON) test/benchmarks/recorder.py --kills $(or $(KILLS),50) $(ARGS)
 
 experiment: setup ## Reproduce the paper's experiments on ../shared/experiments (ARGS="..." for options).
 	@$(VENV_PYTHON) -m rebt_ros.commands.experiment ../shared/experiments $(ARGS)

@@ -106,6 +106,13 @@ def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
     ):
         course = Course(peer)
         shown = course.demonstrate(lambda: course.robot.gripped)
+        peer.wait_until(
+            lambda: (
+                (one := peer.diagnostics.get("recorder: recording"))
+                and values_of(one)["rows"] == str(shown)
+            ),
+            what="the rows",
+        )
         answer = peer.call("/learner/relearn")
         assert f"{shown} rows of 1 demonstration" in answer.message
         assert peer.call("/executor/enable", True).success
