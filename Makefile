@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench-reduction bench-recorder experiment lint format clean
+.PHONY: help setup build demo test bench-reduction bench-recorder experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -54,6 +54,21 @@ bench-recorder: setup ## Kill, load and measure the recorder (KILLS=50; ARGS="..
 
 experiment: setup ## Reproduce the paper's experiments on ../shared/experiments (ARGS="..." for options).
 	@$(VENV_PYTHON) -m rebt_ros.commands.experiment ../shared/experiments $(ARGS)
+
+# Sizes are multiplied by SCALE; a SEED makes the same inputs again.
+fuzz: SCALE ?= 1
+fuzz: SEED ?=
+fuzz: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+fuzz: setup ## Throw mutated input at all readers and at a running executor (SCALE=0.1, SEED=7, ARGS="...").
+	@PYTHONPATH=test:. $(VENV_PYTHON) -m fuzz --scale $(SCALE) $(if $(SEED),--seed $(SEED)) \
+	    --output bench-results/fuzz.json $(ARGS)
+
+soak: MINUTES ?= 10
+soak: SEED ?=
+soak: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+soak: setup ## Run the nodes under load and random faults; nothing may get lost (MINUTES=10, SEED=7, ARGS=--verbose).
+	@PYTHONPATH=test:. $(VENV_PYTHON) -m soak --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) \
+	    --output bench-results/soak.json $(ARGS)
 
 lint: setup ## Check style, formatting and types.
 	@status=0; \
