@@ -11,7 +11,7 @@ from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.routines.moments import Moments, Word
 
 #: Different words that are read, those with the most rows.
-_MOST_WORDS = 150
+_MOST_WORDS = 120
 #: Actions of a word that are read.
 LONGEST_WORD = 9
 #: Probability that a row belongs to nothing that the program knows.

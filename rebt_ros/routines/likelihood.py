@@ -132,10 +132,9 @@ class Model:
     Args:
         program: At least one stream.
         corpus: What is read.
-        like: Has learned the same corpus; its streams' probabilities are those to begin with.
     """
 
-    def __init__(self, program: Program, corpus: Corpus, like: Model | None = None) -> None:
+    def __init__(self, program: Program, corpus: Corpus) -> None:
         self.program = program
         self.corpus = corpus
         persistence = round(min(max(corpus.continues, 0.3), 0.9), 2)
@@ -168,12 +167,6 @@ class Model:
             padded = np.zeros((len(part.before), size))
             padded[:, mine] = part.after
             after.append(padded)
-        self._borders_of = [
-            slice(end - len(part.borders), end)
-            for part, end in zip(
-                parts, np.cumsum([len(part.borders) for part in parts]), strict=True
-            )
-        ]
         self._before = np.concatenate(before)
         self._after = np.concatenate(after)
         self._border = np.concatenate(border)
@@ -184,23 +177,7 @@ class Model:
         self._enters[0] = self._first
         self._idle = _first_guess(len(parts))
         self._kind = np.full(_KINDS, 1 / _KINDS)
-        if like is not None:
-            self._take_over(like)
         self._assemble()
-
-    def _take_over(self, like: Model) -> None:
-        """Begins with the probabilities of another model where it has the same streams."""
-        self._kind = like._kind
-        if len(self.program) == len(like.program):
-            self._idle = like._idle.copy()
-        known = {stream: place for place, stream in enumerate(like.program)}
-        for here, stream in enumerate(self.program):
-            there = known.get(stream)
-            if there is not None:
-                mine, its = self._of_stream[here], like._of_stream[there]
-                self._idle[:, here] = like._idle[:, there]
-                self._enters[:, here, mine] = like._enters[:, there, its]
-                self.goes_on[self._borders_of[here]] = like.goes_on[like._borders_of[there]]
 
     def fit(self, rounds: int) -> float:
         """Learns the probabilities.

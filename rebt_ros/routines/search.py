@@ -13,11 +13,11 @@ from rebt_ros.routines.program import Program, Routine, Stream, states_needed, t
 
 #: Searches that begin with a word, those of them that are brought to an end, and how often streams
 #: of what they found are put together anew.
-_BEGINNINGS = 4
+_BEGINNINGS = 3
 _FINALISTS = 2
-_RECOMBINATIONS = 3
+_RECOMBINATIONS = 2
 #: Programs that a search looks at at first, and to the end.
-_FEW, _MANY = 250, 1000
+_FEW, _MANY = 250, 700
 #: How often what is repeated is taken to be repeated, and what is tried in the end.
 _ROUNDS = 3
 _OTHER_ROUNDS = (2, 4, 5, 6)
@@ -66,7 +66,7 @@ def programs(moments: Moments, corpus: Corpus) -> list[Program]:
     for times in _OTHER_ROUNDS:
         program = _with_rounds(best.program, times)
         if program != best.program and states_needed(program) <= MOST_STATES:
-            other = _judge(program, corpus, _LOOK, best.model)
+            other = _judge(program, corpus, _LOOK)
             if other.score > best.score + _GAIN:
                 best = _climb(other, corpus, times, _MANY)
                 found.append(best)
@@ -110,7 +110,7 @@ def _recombined(best: _Judged, streams: list[Stream], corpus: Corpus) -> _Judged
         for end in range(place, len(program) + 1)
     )
     judged = [
-        _judge(one, corpus, _GLANCE, best.model)
+        _judge(one, corpus, _GLANCE)
         for one in changed
         if one != program and states_needed(one) <= MOST_STATES
     ]
@@ -149,7 +149,7 @@ def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
             some, waiting = waiting[:_AT_ONCE], waiting[_AT_ONCE:]
             seen.update(some)
             looked += len(some)
-            judged = [_judge(one, corpus, _GLANCE, best.model) for one in some]
+            judged = [_judge(one, corpus, _GLANCE) for one in some]
             glanced += judged
             first = max(judged, key=lambda one: one.rank)
             if first.score > best.score + _PROMISING:
@@ -170,6 +170,6 @@ def _better_than(best: _Judged, judged: list[_Judged], corpus: Corpus) -> _Judge
     return None
 
 
-def _judge(program: Program, corpus: Corpus, rounds: int, like: Model | None = None) -> _Judged:
-    model = Model(program, corpus, like)
+def _judge(program: Program, corpus: Corpus, rounds: int) -> _Judged:
+    model = Model(program, corpus)
     return _Judged(model.fit(rounds), program, model)
