@@ -35,6 +35,7 @@ LAYERS: Final = (
     {"selection", "options"},
     {"evaluation", "pictures", "simulation", "storage"},
     {"algorithms"},
+    {"routines"},
     {"decision_tree"},
     {"edit_distance"},
     {"behavior_tree"},
