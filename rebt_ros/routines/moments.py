@@ -49,7 +49,8 @@ def moments(table: DemonstrationTable) -> Moments:
     """Gathers the rows of a table that share one state."""
     begins = np.ones(len(table), dtype=bool)
     if len(table) > 1:
-        states = table.states
+        # What was some rows before changes within a moment, too.
+        states = table.states[:, [not feature.lag for feature in table.features]]
         same = (states[1:] == states[:-1]) | (np.isnan(states[1:]) & np.isnan(states[:-1]))
         # Without a state there is but the time to tell moments apart.
         alike = same.all(axis=1) if table.features else np.diff(table.stamps) == 0
