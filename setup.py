@@ -68,7 +68,7 @@ setup(
     extras_require={
         "cluster": ["distributed>=2023.5", "joblib>=1.4"],
         "pictures": ["matplotlib>=3.6"],
-        "test": ["hypothesis", "jsonschema>=4.10", "pytest"],
+        "test": ["hypothesis", "jsonschema>=4.10", "pytest", "pytest-xdist>=3"],
         "upsampling": ["imbalanced-learn>=0.12"],
     },
     cmdclass={"install_scripts": InstallScripts},
