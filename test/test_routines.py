@@ -21,7 +21,7 @@ from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, Literal, Threshold
 from rebt_ros.routines.corpus import LONGEST_WORD, Corpus, corpus
 from rebt_ros.routines.guards import Guard, guard, holds
-from rebt_ros.routines.likelihood import Model
+from rebt_ros.routines.likelihood import _PRICE, Model
 from rebt_ros.routines.moments import Word, moments
 from rebt_ros.routines.moves import MOST_STATES, neighbours
 from rebt_ros.routines.program import (
@@ -194,6 +194,17 @@ def test_expectation_maximization_never_lowers_the_likelihood(
     assert all(math.isfinite(score) for score in scores)
     rounding = 1e-5 * read.moments
     assert all(after >= before - rounding for before, after in pairwise(scores))
+
+
+def test_what_a_program_can_say_exactly_is_learned() -> None:
+    read = corpus_of(*[(A,)] * 5, *[(B,)] * 3, *[(A, B)] * 2, times=500)
+    model = Model((sequence(A), sequence(B)), read)
+    scores = [model.fit(1) for _ in range(40)]
+    assert all(after >= before - 0.1 for before, after in pairwise(scores))
+    # More than the words' entropy is due to noise, which no stream shares out.
+    price = _PRICE * read.moments * complexity(model.program)
+    entropy = -sum(share * math.log(share) for share in (0.5, 0.3, 0.2)) * read.moments
+    assert scores[-1] + price == pytest.approx(-entropy, abs=0.005 * read.moments)
 
 
 @settings(max_examples=20, deadline=None)
