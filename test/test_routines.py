@@ -176,7 +176,7 @@ def test_what_is_repeated_folds_into_one_routine(order: list[int], length: int, 
 # --- likelihood ---------------------------------------------------------------------------------
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(programs, st.lists(words, min_size=1, max_size=8))
 def test_expectation_maximization_never_lowers_the_likelihood(
     program: Program, shown: list[Word]
@@ -377,7 +377,7 @@ def test_the_conditions_that_decide_are_found(wanted: Guard, seed: int) -> None:
 
 def test_hardly_any_condition_is_found_where_chance_decides() -> None:
     found = 0
-    for seed in range(150):
+    for seed in range(100):
         states = random_states(400, seed)
         chance = events(np.ones(len(states), dtype=bool), seed, inside=0.3 + 0.1 * (seed % 5))
         found += bool(guard(states, chance, some.FEATURES, 0.75))
