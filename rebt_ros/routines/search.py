@@ -143,6 +143,8 @@ def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
     while looked < most:
         waiting = [one for one in neighbours(best.program, corpus, rounds) if one not in seen]
         draw.shuffle(waiting)
+        # With many actions there are more neighbours than can be looked at.
+        waiting = waiting[: most - looked]
         glanced: list[_Judged] = []
         better = None
         while waiting and better is None:
