@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rebt_ros.algorithms.lat_occurrences import runs
+from rebt_ros.algorithms.lat_occurrences import rows
 from rebt_ros.algorithms.lat_trees import gen_lat_trees
 from rebt_ros.algorithms.re_bt_espresso import build_inv_set, logic_minimizer, reduce_floats
 from rebt_ros.algorithms.rules import dt_to_rules_psa
@@ -28,6 +28,8 @@ from rebt_ros.routines.finding import FoundRoutine, find_routines
 #: More than a person wants to look through, and how many of them may be routines.
 _MOST_SUGGESTIONS = 12
 _MOST_ROUTINES = 10
+#: Repeaters of single loops, in the paper's mode.
+_MOST_LOOPS = 24
 
 
 def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[FoundRoutine, ...]:
@@ -71,11 +73,15 @@ def suggest(
     inv_set = build_inv_set(rules)
     lat_trees = gen_lat_trees(
         reduce_floats(logic_minimizer(rules)),
-        runs(table),
+        rows(table),
         inv_set=inv_set,
         least_support=0 if options.is_paper else 1,
+        most_loops=_MOST_LOOPS if options.is_paper else 0,
     )
-    offered = (*psa_suggestions(psa_rules), *lat_suggestions(lat_trees.trees))
+    offered = (
+        *psa_suggestions(psa_rules),
+        *lat_suggestions((*lat_trees.trees, *lat_trees.loops)),
+    )
     left_out = lat_trees.left_out.paths
     found = routine_suggestions(routines[:_MOST_ROUTINES])
     room = _MOST_SUGGESTIONS - len(found)

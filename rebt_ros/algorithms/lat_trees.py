@@ -18,6 +18,10 @@ Differences from the printed algorithm:
 - A path that is one cycle node gives its Repeater without a Sequence over it, and an action without
   edges gives nothing, as its rule is in the main tree.
 - The number of paths is bounded.
+
+Beside the paths, Repeaters of single loops can be asked for (`single_loops`): replacing one cycle
+after the other leaves one Repeater of each bundle of cycles, in which the simple ones are nested
+where nobody finds them.
 """
 
 from __future__ import annotations
@@ -25,11 +29,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from rebt_ros.algorithms.lat_cycles import CycleStart, remove_cycles
+from rebt_ros.algorithms.lat_cycles import Acyclic, CycleStart, remove_cycles
 from rebt_ros.algorithms.lat_graph import (
     ActionNode,
     CycleNode,
     GraphNode,
+    LatGraph,
     generate_graph,
     last_action,
 )
@@ -45,6 +50,8 @@ from rebt_ros.logic.float_reduction import float_reduction
 
 #: LAT trees that are built unless told otherwise.
 MOST_PATHS = 64
+#: Repeaters of single loops that are built unless told otherwise.
+MOST_LOOPS = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +86,8 @@ class LatTrees:
     trees: tuple[LatTree, ...]
     """The best supported first, of equals the longest path."""
     left_out: LeftOut
+    loops: tuple[LatTree, ...] = ()
+    """Repeaters of single loops that are none of the trees, the best supported first."""
 
 
 def gen_lat_trees(
@@ -89,17 +98,20 @@ def gen_lat_trees(
     start: CycleStart = CycleStart.MOST_FREQUENT,
     most_paths: int = MOST_PATHS,
     least_support: int = 0,
+    most_loops: int = MOST_LOOPS,
 ) -> LatTrees:
     """GEN_LAT_TREES: a Sequence, or a Repeater, for every path of actions through the rules.
 
     Args:
         rules: Minimized and float-reduced, but unfactored.
-        shown: The actions of each demonstration (see `lat_occurrences.runs`).
+        shown: The actions of each demonstration; loops of one action need all rows (see
+            `lat_occurrences.rows`).
         inv_set: Literals to be shown as Inverters (Algorithm 1, line 3).
         start: Which node a cycle starts with; the linked code of the paper chooses arbitrarily.
         most_paths: How many trees to build at most.
         least_support: How often a path must have occurred; 0, as in the paper, also keeps those
             that the rules allow for but nobody has shown as a whole.
+        most_loops: How many Repeaters of single loops to build at most.
     """
     rules = tuple(rules)
     occurrences = Occurrences(shown)
@@ -119,7 +131,36 @@ def gen_lat_trees(
                 subtree = nodes.Sequence(steps, memory=True)  # line 5
         return_list.append(LatTree(path.nodes, path.support, subtree))  # line 22
     left_out = LeftOut(found.left_out, acyclic.edges, acyclic.self_loops)
-    return LatTrees(tuple(return_list), left_out)  # line 24
+    there = {path.nodes for path in found.paths}
+    loops = [
+        (cycle, support)
+        for cycle, support in single_loops(graph, acyclic, occurrences)
+        if (cycle,) not in there
+    ]
+    repeaters = tuple(
+        LatTree((cycle,), support, repeater(cycle, dnfs, inv_set))
+        for cycle, support in loops[:most_loops]
+    )
+    return LatTrees(tuple(return_list), left_out, repeaters)  # line 24
+
+
+def single_loops(
+    graph: LatGraph, acyclic: Acyclic, occurrences: Occurrences
+) -> list[tuple[CycleNode, int]]:
+    """Loops that were shown and how often, the most frequent first, of equals the shortest.
+
+    - The simple cycles of the LAT graph: how often the demonstrations closed them.
+    - An action or PSA group that was done twice or more in a row: how often it was.  LAT is the
+      last *different* action, so that the graph has no edge for it, or at most, between the members
+      of a group, one from the group to itself.
+    """
+    loops = [(one.cycle, one.times) for one in acyclic.closed]
+    loops += [
+        (CycleNode((node,)), times)
+        for node in graph.nodes
+        if isinstance(node, ActionNode) and (times := occurrences.repetitions(node))
+    ]
+    return sorted(loops, key=lambda loop: (-loop[1], len(loop[0].path)))
 
 
 def repeater(
