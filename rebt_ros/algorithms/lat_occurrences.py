@@ -33,6 +33,9 @@ _Places: TypeAlias = int
 #: Where a run of an action node stands, or what a cycle node goes through.
 _Compiled: TypeAlias = "_Places | tuple[_Compiled, ...]"
 
+#: Places that are looked at for the end of an occurrence before more are.
+_PART = 256
+
 
 def runs(table: DemonstrationTable) -> Runs:
     """The actions of each demonstration of the table, runs of equal ones as one."""
@@ -96,7 +99,7 @@ class Occurrences:
 
     def after(self, node: GraphNode, starts: _Places) -> _Places:
         """The places at which occurrences of the node end that begin at one of `starts`."""
-        return _after(self._as_compiled(node), starts)
+        return _after(self._as_compiled(node), starts, self.everywhere)
 
     def _as_compiled(self, node: GraphNode) -> _Compiled:
         if node not in self._compiled:
@@ -108,16 +111,23 @@ class Occurrences:
         return self._compiled[node]
 
 
-def _after(node: _Compiled, starts: _Places) -> _Places:
-    """The places at which occurrences of the node end that begin at one of `starts`."""
+def _after(node: _Compiled, starts: _Places, limit: _Places) -> _Places:
+    """The places at which occurrences of the node end that begin at one of `starts`.
+
+    Raises:
+        _FartherError: One of them, or a part of one, ends behind the places of the limit.
+    """
     if isinstance(node, int):
-        return (starts & node) << 1
-    full = _once_or_more(lambda places: _all_after(node, places), starts)
+        ends = (starts & node) << 1
+        if ends > limit:
+            raise _FartherError
+        return ends
+    full = _once_or_more(lambda places: _all_after(node, places, limit), starts)
     left, ends = full, full
     for step in node[:-1]:
         if not ends:
             break
-        ends = _after(step, ends)
+        ends = _after(step, ends, limit)
         left |= ends
     return left
 
@@ -132,11 +142,11 @@ def _before(node: _Compiled, ends: _Places) -> _Places:
     return _once_or_more(lambda places: _all_before(node, places), full)
 
 
-def _all_after(path: Iterable[_Compiled], starts: _Places) -> _Places:
+def _all_after(path: Iterable[_Compiled], starts: _Places, limit: _Places) -> _Places:
     for node in path:
         if not starts:
             break
-        starts = _after(node, starts)
+        starts = _after(node, starts, limit)
     return starts
 
 
@@ -148,19 +158,56 @@ def _all_before(path: Sequence[_Compiled], ends: _Places) -> _Places:
     return ends
 
 
-def _count(path: Sequence[_Compiled], starts: _Places) -> int:
+def _count(path: tuple[_Compiled, ...], starts: _Places) -> int:
     """The longest occurrences from left to right, without overlaps."""
     occurrences, free = 0, 0
     of_one_length = all(isinstance(node, int) for node in path)
+    walk = _LongestWalk(path)
     for start in _as_list(starts):
         if start >= free:
             occurrences += 1
-            free = (
-                start + len(path)
-                if of_one_length
-                else _all_after(path, 1 << start).bit_length() - 1
-            )
+            free = start + len(path) if of_one_length else walk.end(start)
     return occurrences
+
+
+class _FartherError(Exception):
+    """A walk leaves the part of the demonstrations that is looked at."""
+
+
+class _LongestWalk:
+    """Finds where the longest occurrence of a path ends that begins at a given place.
+
+    Occurrences are short and demonstrations are not, so only a part of them is looked at, and a
+    longer one if an occurrence could go on behind it.
+    """
+
+    def __init__(self, path: tuple[_Compiled, ...]) -> None:
+        self._path = path
+        self._begin = self._length = 0
+        self._part: tuple[_Compiled, ...] = ()
+
+    def end(self, start: int) -> int:
+        """The place at which it ends; one must begin at `start`."""
+        if not self._begin <= start < self._begin + self._length // 2:
+            self._look_at(start, _PART)
+        while True:
+            limit = (1 << self._length) - 1
+            try:
+                ends = _all_after(self._part, 1 << (start - self._begin), limit)
+            except _FartherError:
+                self._look_at(start, 4 * self._length)
+            else:
+                return self._begin + ends.bit_length() - 1
+
+    def _look_at(self, begin: int, length: int) -> None:
+        self._begin, self._length = begin, length
+        self._part = tuple(_cut(node, begin, (1 << length) - 1) for node in self._path)
+
+
+def _cut(node: _Compiled, begin: int, mask: _Places) -> _Compiled:
+    if isinstance(node, int):
+        return (node >> begin) & mask
+    return tuple(_cut(step, begin, mask) for step in node)
 
 
 def _once_or_more(one_pass: Callable[[_Places], _Places], places: _Places) -> _Places:
