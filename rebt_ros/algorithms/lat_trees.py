@@ -39,7 +39,7 @@ from rebt_ros.algorithms.lat_graph import (
     last_action,
 )
 from rebt_ros.algorithms.lat_occurrences import Occurrences, Runs
-from rebt_ros.algorithms.lat_paths import LatPaths, source_to_sink_paths
+from rebt_ros.algorithms.lat_paths import LatPath, LatPaths, source_to_sink_paths
 from rebt_ros.algorithms.re_bt_espresso import action_tree, condition_trees
 from rebt_ros.algorithms.rules import Rule
 from rebt_ros.behavior_tree import nodes
@@ -161,7 +161,7 @@ def gen_lat_trees(
     loops = (
         [
             loop
-            for loop in single_loops(graph, acyclic, demonstrated.occurrences)
+            for loop in single_loops(graph, acyclic, found.paths, demonstrated.occurrences)
             if (loop[0],) not in there
         ]
         if most_loops
@@ -178,7 +178,7 @@ def gen_lat_trees(
 
 
 def single_loops(
-    graph: LatGraph, acyclic: Acyclic, occurrences: Occurrences
+    graph: LatGraph, acyclic: Acyclic, paths: Iterable[LatPath], occurrences: Occurrences
 ) -> list[tuple[CycleNode, int]]:
     """Loops that were shown and how often, the most frequent first, of equals the shortest.
 
@@ -186,14 +186,18 @@ def single_loops(
     - An action or PSA group that was done twice or more in a row: how often it was.  LAT is the
       last *different* action, so that the graph has no edge for it, or at most, between the members
       of a group, one from the group to itself.
+    - A path of actions that was done twice or more in a row: how often it was.  A rule that tells
+      by ``LAT != a`` when its action begins the path again has no edge for it either.
     """
-    loops = [(one.cycle, one.times) for one in acyclic.closed]
-    loops += [
-        (CycleNode((node,)), times)
-        for node in graph.nodes
-        if isinstance(node, ActionNode) and (times := occurrences.repetitions(node))
-    ]
-    return sorted(loops, key=lambda loop: (-loop[1], len(loop[0].path)))
+    loops = {one.cycle: one.times for one in acyclic.closed}
+    for node in graph.nodes:
+        if isinstance(node, ActionNode) and (times := occurrences.repetitions(node)):
+            loops.setdefault(CycleNode((node,)), times)
+    for path in paths:
+        of_actions = all(isinstance(node, ActionNode) for node in path.nodes)
+        if of_actions and (times := occurrences.count((*path.nodes, *path.nodes))):
+            loops.setdefault(CycleNode(path.nodes), times)
+    return sorted(loops.items(), key=lambda loop: (-loop[1], len(loop[0].path)))
 
 
 def repeater(
