@@ -27,9 +27,10 @@ from rebt_ros.routines.finding import FoundRoutine, find_routines
 
 #: More than a person wants to look through, and how many of them may be routines.
 _MOST_SUGGESTIONS = 12
-_MOST_ROUTINES = 10
-#: Repeaters of single loops, in the paper's mode.
-_MOST_LOOPS = 24
+_MOST_ROUTINES = 8
+#: Repeaters of single loops, in the paper's mode and beside routines: where no routines are found,
+#: rows are samples, and an action that is done for long is no loop.
+_MOST_LOOPS, _LOOPS_BESIDE_ROUTINES = 24, 4
 
 
 def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[FoundRoutine, ...]:
@@ -84,7 +85,7 @@ def suggest(
         demonstrated or demonstrated_in(table),
         inv_set=inv_set,
         least_support=0 if options.is_paper else 1,
-        most_loops=_MOST_LOOPS if options.is_paper else 0,
+        most_loops=_MOST_LOOPS if options.is_paper else _LOOPS_BESIDE_ROUTINES * bool(routines),
     )
     offered = (
         *psa_suggestions(psa_rules),
@@ -94,7 +95,8 @@ def suggest(
     found = routine_suggestions(routines[:_MOST_ROUTINES])
     room = _MOST_SUGGESTIONS - len(found)
     if not options.is_paper and len(offered) > room:
-        ranked = sorted(offered, key=lambda one: -one.support)
+        loops = {tree.subtree for tree in lat_trees.loops}
+        ranked = sorted(offered, key=lambda one: (one.subtree not in loops, -one.support))
         left_out += len(ranked) - room
         offered = tuple(ranked[:room])
     left_out += len(routines) - len(found)
