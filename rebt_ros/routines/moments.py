@@ -49,10 +49,12 @@ def moments(table: DemonstrationTable) -> Moments:
     """Gathers the rows of a table that share one state."""
     begins = np.ones(len(table), dtype=bool)
     if len(table) > 1:
-        states = table.states
+        # What was before tells rows of one state apart.
+        now = [place for place, feature in enumerate(table.features) if not feature.lag]
+        states = table.states[:, now]
         same = (states[1:] == states[:-1]) | (np.isnan(states[1:]) & np.isnan(states[:-1]))
         # Without a state there is but the time to tell moments apart.
-        alike = same.all(axis=1) if table.features else np.diff(table.stamps) == 0
+        alike = same.all(axis=1) if now else np.diff(table.stamps) == 0
         begins[1:] = ~alike | (np.diff(table.demonstration) != 0)
     first = np.flatnonzero(begins)
     last = np.append(first[1:], len(table))
