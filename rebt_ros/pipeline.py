@@ -202,6 +202,7 @@ def learn_from(
         tree = convert(trained, options, psa=policy.psa)
         figures = replace(figures, fidelity_mismatches=_mismatches(table, trained, tree))
     learned_from = table if options.refit else shown
+    progress("suggesting", 0.9)
     routines = routines_of(learned_from, options)
     suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options, routines)
     if options.lags and not evenly_spaced(table):

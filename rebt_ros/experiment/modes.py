@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from rebt_ros.algorithms.lat_trees import Demonstrated
 from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
 from rebt_ros.algorithms.suggestions import ALL
 from rebt_ros.behavior_tree import nodes
@@ -73,6 +74,7 @@ def offer(
     main: nodes.Node,
     ccp_alpha: float,
     routines: Sequence[FoundRoutine],
+    demonstrated: Demonstrated,
 ) -> Offer:
     """The generated subtrees of a pruning level.
 
@@ -83,17 +85,18 @@ def offer(
         main: What `main_tree` made of it.
         ccp_alpha: How far it is pruned.
         routines: What was found in the table, for the default.
+        demonstrated: What was done in the table.
     """
     if mode is Mode.BASELINE:
         return Offer(under_root(main), 0)
     if mode is Mode.PAPER:
         options = replace(LearnOptions.paper(), attach=(ALL,))
-        suggestions, _ = suggest(table, trained, ccp_alpha, options)
+        suggestions, _ = suggest(table, trained, ccp_alpha, options, demonstrated=demonstrated)
         attached, _ = accept(main, suggestions, options)
         # A single rule gets a root once something is attached.
         return Offer(under_root(attached), len(suggestions))
     options = replace(DEFAULTS, max_depth=MAX_DEPTH)
-    suggestions, _ = suggest(table, trained, ccp_alpha, options, routines)
+    suggestions, _ = suggest(table, trained, ccp_alpha, options, routines, demonstrated)
     if len(suggestions) > MOST_SUGGESTIONS:
         raise AssertionError(f"{len(suggestions)} suggestions by default")
     subtrees = tuple(one.subtree for one in suggestions)

@@ -27,9 +27,12 @@ _THOROUGH = 10
 _MOST_PROGRAMS = 3
 #: Events that tell what another round depends on.
 _FEWEST_ROUNDS = 100
+#: How often a step must follow in the same moment; its guard may contradict the one before, and
+#: then it never does.
+_FEWEST_PASSED = 30
 #: How much rarer going on must be where a guard does not hold: within a stream, and at its
 #: beginning, which may also have been waited for while the state changed.
-_CONTRAST, _CONTRAST_AT_BEGINNING = 0.6, 0.75
+_CONTRAST, _CONTRAST_AT_BEGINNING = 0.6, 0.72
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +74,10 @@ def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:
     return tuple(offered.values())
 
 
+#: Where a stream begins.
+_START = Place(0, 0)
+
+
 @dataclass(frozen=True, slots=True)
 class _Border:
     """Between two steps of a stream."""
@@ -102,7 +109,10 @@ class _Reading:
         self._shown = shown
         self._features = features
         self._borders: dict[_Border, _Events] = {}
-        self._begun: dict[int, set[int]] = {}
+        #: Events after all rounds of a routine.  Where fewer were seen, it may not have been the
+        #: last one, the more likely the earlier the moment began, which hangs on the state.
+        self._after_all: dict[_Border, _Events] = {}
+        self._begun: dict[tuple[int, Place], set[int]] = {}
         #: Rows that are a member of the step at a place of a stream.
         self._rows: dict[tuple[int, Place, int], int] = {}
         of_word: list[list[int]] = [[] for _ in shown.words]
@@ -119,8 +129,9 @@ class _Reading:
         for before, after in zip([None, *states], [*states, None], strict=True):
             if before is None or (after is not None and after.stream != before.stream):
                 rounds = 0
-                if after is not None and self._place(after) == Place(0, 0):
-                    self._begun.setdefault(after.stream, set()).update(where)
+                if after is not None:
+                    begun = (after.stream, self._place(after))
+                    self._begun.setdefault(begun, set()).update(where)
             if before is None:
                 continue
             place, goes_on = self._place(before), None
@@ -135,6 +146,8 @@ class _Reading:
             for follower in self._followers(before.stream, place, rounds):
                 border = _Border(before.stream, place, follower)
                 self._borders.setdefault(border, _Events()).add(where, goes_on == follower)
+                if rounds >= routine.rounds:
+                    self._after_all.setdefault(border, _Events()).add(where, goes_on == follower)
                 if goes_on == follower:
                     break
 
@@ -187,17 +200,21 @@ class _Reading:
         """What must hold before a step."""
         here = Place(number, place)
         if place:
-            return self._learned(_Border(stream, Place(number, place - 1), here))
+            border = _Border(stream, Place(number, place - 1), here)
+            return self._told_by(self._borders.get(border, _Events()), here=here, stream=stream)
         again = self._again(stream, number)
         if again is not None:
             return again
-        if number:
-            before = Place(number - 1, len(self._program[stream][number - 1].steps) - 1)
-            # Where the routine before would go on from the beginning, it also ends by failing.
-            return self._learned(_Border(stream, before, here), self._again(stream, number - 1))
-        begun = np.zeros(len(self._shown), dtype=bool)
-        begun[list(self._begun.get(stream, ()))] = True
-        return guard(self._shown.states, begun, self._features, _CONTRAST_AT_BEGINNING)
+        if not number:
+            return self._where_begun(stream, here)
+        last = Place(number - 1, len(self._program[stream][number - 1].steps) - 1)
+        border = _Border(stream, last, here)
+        sure = self._after_all.get(border, _Events())
+        if len(sure.moments) >= _FEWEST_ROUNDS:
+            return self._told_by(sure, here=here, stream=stream)
+        # Where the routine before would go on from the beginning, it also ends by failing.
+        where = self._again(stream, number - 1)
+        return self._told_by(self._borders.get(border, _Events()), where, here, stream)
 
     def _again(self, stream: int, number: int) -> Guard | None:
         """What must hold before another round, None if there is none or it was rarely seen."""
@@ -205,15 +222,32 @@ class _Reading:
         border = _Border(stream, Place(number, len(routine.steps) - 1), Place(number, 0))
         if len(self._borders.get(border, _Events()).moments) < _FEWEST_ROUNDS:
             return None
-        return self._learned(border)
+        return self._told_by(self._borders[border], here=Place(number, 0), stream=stream)
 
-    def _learned(self, border: _Border, where: Guard | None = None) -> Guard:
-        events = self._borders.get(border, _Events())
+    def _told_by(
+        self, events: _Events, where: Guard | None = None, here: Place = _START, stream: int = 0
+    ) -> Guard:
+        """What decides on going on to a place of a stream.
+
+        Args:
+            events: When that might have happened.
+            where: What must hold for them to count.
+            here: The place.
+            stream: The stream.
+        """
+        if sum(events.went_on) < _FEWEST_PASSED:
+            return self._where_begun(stream, here)
         states, went_on = self._shown.states[events.moments], np.array(events.went_on, dtype=bool)
         if where:
             counted = holds(where, states, self._features)
             states, went_on = states[counted], went_on[counted]
         return guard(states, went_on, self._features, _CONTRAST)
+
+    def _where_begun(self, stream: int, here: Place) -> Guard:
+        """What tells the moments in which a stream begins at a place from all others."""
+        begun = np.zeros(len(self._shown), dtype=bool)
+        begun[list(self._begun.get((stream, here), ()))] = True
+        return guard(self._shown.states, begun, self._features, _CONTRAST_AT_BEGINNING)
 
 
 def _sequence(children: tuple[nodes.Node, ...]) -> nodes.Sequence:

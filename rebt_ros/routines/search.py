@@ -13,8 +13,8 @@ from rebt_ros.routines.program import Program, Routine, Stream, states_needed, t
 
 #: Searches that begin with a word, those of them that are brought to an end, and how often streams
 #: of what they found are put together anew.
-_BEGINNINGS = 3
-_FINALISTS = 2
+_BEGINNINGS = 4
+_FINALISTS = 3
 _RECOMBINATIONS = 2
 #: Programs that a search looks at at first, and to the end.
 _FEW, _MANY = 250, 700
@@ -143,6 +143,8 @@ def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
     while looked < most:
         waiting = [one for one in neighbours(best.program, corpus, rounds) if one not in seen]
         draw.shuffle(waiting)
+        # With many actions there are more neighbours than can be looked at.
+        waiting = waiting[: most - looked]
         glanced: list[_Judged] = []
         better = None
         while waiting and better is None:
