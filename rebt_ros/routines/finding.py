@@ -41,7 +41,7 @@ class FoundRoutine:
 
     subtree: nodes.Sequence | nodes.Repeater
     support: int
-    """How often it was ended."""
+    """How often it was gone through: as often as the rarest of its actions was done in it."""
     rows: int
     """How many rows it explains."""
 
@@ -113,8 +113,8 @@ class _Reading:
         #: last one, the more likely the earlier the moment began, which hangs on the state.
         self._after_all: dict[_Border, _Events] = {}
         self._begun: dict[tuple[int, Place], set[int]] = {}
-        self._rows: dict[tuple[int, int], int] = {}
-        self._ended: dict[tuple[int, int], int] = {}
+        #: Rows that are a member of the step at a place of a stream.
+        self._rows: dict[tuple[int, Place, int], int] = {}
         of_word: list[list[int]] = [[] for _ in shown.words]
         for moment, word in enumerate(shown.word.tolist()):
             of_word[word].append(moment)
@@ -138,13 +138,11 @@ class _Reading:
             if after is not None and after.stream == before.stream:
                 goes_on = self._place(after)
             routine = self._program[before.stream][place.routine]
-            key = (before.stream, place.routine)
+            key = (before.stream, place, before.member)
             self._rows[key] = self._rows.get(key, 0) + len(where)
             if not before.completes(routine.steps[place.step]) or (cut and after is None):
                 continue
             rounds += self._ends(place, before.stream)
-            if self._ends(place, before.stream):
-                self._ended[key] = self._ended.get(key, 0) + len(where)
             for follower in self._followers(before.stream, place, rounds):
                 border = _Border(before.stream, place, follower)
                 self._borders.setdefault(border, _Events()).add(where, goes_on == follower)
@@ -177,10 +175,12 @@ class _Reading:
                 children = self._children(stream, number, routine, channel)
                 if len(children) > 1:
                     kind = nodes.Repeater if routine.rounds > 1 else _sequence
-                    key = (stream, number)
-                    yield FoundRoutine(
-                        kind(children), self._ended.get(key, 0), self._rows.get(key, 0)
-                    )
+                    rows = [
+                        self._rows.get((stream, Place(number, step), member), 0)
+                        for step, members in enumerate(routine.steps)
+                        for member in range(len(members))
+                    ]
+                    yield FoundRoutine(kind(children), min(rows), sum(rows))
 
     def _children(
         self, stream: int, number: int, routine: Routine, channel: str
