@@ -203,9 +203,9 @@ def _joined_states(
     end = 0
     for one in demonstrations:
         start, end = end, end + len(one)
-        for index, (mine, unified) in enumerate(zip(one.features, features, strict=True)):
-            if mine.categories != unified.categories:
-                states[start:end, index] = _recoded(one.states[:, index], mine, unified)
+        for index, (feature, unified) in enumerate(zip(one.features, features, strict=True)):
+            if feature.categories != unified.categories:
+                states[start:end, index] = _recoded(one.states[:, index], feature, unified)
     return features, states
 
 
