@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench bench-reduction bench-recorder experiment lint format clean
+.PHONY: help setup build demo test bench bench-reduction bench-recorder experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -35,12 +35,14 @@ demo: build ## Demonstrate, learn and let the learned tree drive a simulated rob
 	@. install/local_setup.sh && exec install/rebt_ros/lib/rebt_ros/demo $(ARGS)
 
 # PYTHONSAFEPATH keeps the checkout off Python's path: the tests import what was installed.
+# Two tests run at a time, as they mostly wait for other processes: files stay together.
 # colcon test succeeds when tests fail; colcon test-result and the count do not.
 test: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 test: build ## Run the tests on the built package.
 	@status=0; \
 	PYTHONSAFEPATH=1 $(COLCON) test --packages-select rebt_ros \
-	    --event-handlers console_direct+ $(QUIET) || status=$$?; \
+	    --event-handlers console_direct+ $(QUIET) \
+	    --pytest-args -n 2 --dist loadfile || status=$$?; \
 	$(COLCON) test-result --test-result-base build/rebt_ros --verbose || status=$$?; \
 	$(VENV_PYTHON) .ci/count_tests.py build/rebt_ros/pytest.xml || status=$$?; \
 	exit $$status
@@ -58,6 +60,21 @@ bench-recorder: setup ## Kill, load and measure the recorder (KILLS=50; ARGS="..
 
 experiment: setup ## Reproduce the paper's experiments on ../shared/experiments (ARGS="..." for options).
 	@$(VENV_PYTHON) -m rebt_ros.commands.experiment ../shared/experiments $(ARGS)
+
+# Sizes are multiplied by SCALE; a SEED makes the same inputs again.
+fuzz: SCALE ?= 1
+fuzz: SEED ?=
+fuzz: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+fuzz: setup ## Throw mutated input at all readers and at a running executor (SCALE=0.1, SEED=7, ARGS="...").
+	@PYTHONPATH=test:. $(VENV_PYTHON) -m fuzz --scale $(SCALE) $(if $(SEED),--seed $(SEED)) \
+	    --output bench-results/fuzz.json $(ARGS)
+
+soak: MINUTES ?= 10
+soak: SEED ?=
+soak: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+soak: setup ## Run the nodes under load and random faults; nothing may get lost (MINUTES=10, SEED=7, ARGS=--verbose).
+	@PYTHONPATH=test:. $(VENV_PYTHON) -m soak --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) \
+	    --output bench-results/soak.json $(ARGS)
 
 lint: setup ## Check style, formatting and types.
 	@status=0; \

@@ -49,7 +49,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
-        (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml"))),
+        (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml") + glob("config/*.xml"))),
     ],
     zip_safe=False,
     python_requires=">=3.11",
@@ -68,7 +68,7 @@ setup(
     extras_require={
         "cluster": ["distributed>=2023.5", "joblib>=1.4"],
         "pictures": ["matplotlib>=3.6"],
-        "test": ["hypothesis", "jsonschema>=4.10", "pytest"],
+        "test": ["hypothesis", "jsonschema>=4.10", "pytest", "pytest-xdist>=3"],
         "upsampling": ["imbalanced-learn>=0.12"],
     },
     cmdclass={"install_scripts": InstallScripts},

@@ -5,9 +5,33 @@ wrapped with ``raise ... from err`` at the border where their context is known; 
 nodes turn a `RebtError` into text, an exit code or a failed service response.
 """
 
+from __future__ import annotations
+
+from typing import Final
+
+#: Longest message (characters), however long the names and values are that it mentions.
+LONGEST_MESSAGE: Final = 1000
+
 
 class RebtError(Exception):
-    """Root of all errors that a user can cause; anything else is a programming mistake."""
+    """Root of all errors that a user can cause; anything else is a programming mistake.
+
+    Messages mention names and values that come from outside.  As text, they are one line that any
+    log, terminal and service response can bear.
+    """
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        if len(text) > LONGEST_MESSAGE:
+            half = (LONGEST_MESSAGE - 1) // 2
+            text = f"{text[:half]}…{text[-half:]}"
+        return text if text.isprintable() else "".join(map(_printable, text))
+
+
+def _printable(character: str) -> str:
+    if character.isprintable():
+        return character
+    return " " if character.isspace() else ascii(character)[1:-1]
 
 
 class InputError(RebtError):

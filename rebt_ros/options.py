@@ -58,6 +58,8 @@ class LearnOptions:
     """Rows that decision trees are fitted to beside those shown; none is ever judged on them."""
     attach: tuple[str, ...] = ()
     """Ids of the suggestions to attach, or `ALL`."""
+    routines: bool = True
+    """Whether Sequences and Repeaters are looked for in rows that share one state."""
     psa_choice: PsaChoice | None = None
     """What to turn all PSA nodes into; None to leave them to the user."""
 
@@ -93,6 +95,7 @@ class LearnOptions:
             ccp_alpha=0.0,
             root=Root.PARALLEL,
             reductions=None,
+            routines=False,
         )
 
 

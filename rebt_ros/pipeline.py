@@ -26,7 +26,7 @@ from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.options import DEFAULTS, LearnOptions
-from rebt_ros.suggesting import accept, suggest
+from rebt_ros.suggesting import accept, routines_of, suggest
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -202,7 +202,9 @@ def learn_from(
         tree = convert(trained, options, psa=policy.psa)
         figures = replace(figures, fidelity_mismatches=_mismatches(table, trained, tree))
     learned_from = table if options.refit else shown
-    suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options)
+    progress("suggesting", 0.9)
+    routines = routines_of(learned_from, options)
+    suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options, routines)
     if options.lags and not evenly_spaced(table):
         notes = (*notes, _UNEVEN.format(table.channel))
     tree, suggestions = accept(tree, suggestions, options)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from rebt_ros.algorithms.lat_occurrences import runs
-from rebt_ros.algorithms.lat_trees import gen_lat_trees
+from rebt_ros.algorithms.lat_occurrences import rows
+from rebt_ros.algorithms.lat_trees import Demonstrated, gen_lat_trees
 from rebt_ros.algorithms.re_bt_espresso import build_inv_set, logic_minimizer, reduce_floats
 from rebt_ros.algorithms.rules import dt_to_rules_psa
 from rebt_ros.algorithms.suggestions import (
@@ -15,19 +16,40 @@ from rebt_ros.algorithms.suggestions import (
     mark,
     psa_suggestions,
     resolve,
+    routine_suggestions,
 )
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Suggestion
 from rebt_ros.decision_tree.training import TrainedTree, fit
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.options import LearnOptions
+from rebt_ros.routines.finding import FoundRoutine, find_routines
 
-#: More than a person wants to look through.
+#: More than a person wants to look through, and how many of them may be routines.
 _MOST_SUGGESTIONS = 12
+_MOST_ROUTINES = 8
+#: Repeaters of single loops, in the paper's mode and beside routines: where no routines are found,
+#: rows are samples, and an action that is done for long is no loop.
+_MOST_LOOPS, _LOOPS_BESIDE_ROUTINES = 24, 4
+
+
+def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[FoundRoutine, ...]:
+    """Routines in a table, if they are asked for; they are the same at all pruning levels."""
+    return find_routines(table) if options.routines else ()
+
+
+def demonstrated_in(table: DemonstrationTable) -> Demonstrated:
+    """What was done in a table, row by row; it is the same at all pruning levels."""
+    return Demonstrated(rows(table))
 
 
 def suggest(
-    table: DemonstrationTable, trained: TrainedTree, ccp_alpha: float, options: LearnOptions
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    ccp_alpha: float,
+    options: LearnOptions,
+    routines: Sequence[FoundRoutine] = (),
+    demonstrated: Demonstrated | None = None,
 ) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
     """What to offer: PSA nodes of the tree, and what a LAT-augmented tree tells about sequences.
 
@@ -36,10 +58,13 @@ def suggest(
         trained: The decision tree of the main tree.
         ccp_alpha: How far the LAT-augmented decision tree is pruned.
         options: How to learn.
+        routines: What `routines_of` found in the table.
+        demonstrated: What `demonstrated_in` makes of the table, which saves time where several
+            trees are learned from it.
 
     Returns:
-        At most twelve suggestions, the best supported first (all of them in the paper's mode), and
-        notes on what was left out.
+        At most twelve suggestions, routines first, then the best supported (all of them in the
+        paper's mode), and notes on what was left out.
     """
     psa_rules = reduce_floats(logic_minimizer(dt_to_rules_psa(trained.tree, options.delta)))
     with_lat = (
@@ -57,16 +82,25 @@ def suggest(
     inv_set = build_inv_set(rules)
     lat_trees = gen_lat_trees(
         reduce_floats(logic_minimizer(rules)),
-        runs(table),
+        demonstrated or demonstrated_in(table),
         inv_set=inv_set,
         least_support=0 if options.is_paper else 1,
+        most_loops=_MOST_LOOPS if options.is_paper else _LOOPS_BESIDE_ROUTINES * bool(routines),
     )
-    offered = (*psa_suggestions(psa_rules), *lat_suggestions(lat_trees.trees))
-    left_out = lat_trees.left_out.paths
-    if not options.is_paper and len(offered) > _MOST_SUGGESTIONS:
-        ranked = sorted(offered, key=lambda one: -one.support)
-        left_out += len(ranked) - _MOST_SUGGESTIONS
-        offered = tuple(ranked[:_MOST_SUGGESTIONS])
+    offered = (
+        *psa_suggestions(psa_rules),
+        *lat_suggestions((*lat_trees.trees, *lat_trees.loops)),
+    )
+    left_out = lat_trees.left_out.paths + lat_trees.left_out.loops
+    found = routine_suggestions(routines[:_MOST_ROUTINES])
+    room = _MOST_SUGGESTIONS - len(found)
+    if not options.is_paper and len(offered) > room:
+        loops = {tree.subtree for tree in lat_trees.loops}
+        ranked = sorted(offered, key=lambda one: (one.subtree not in loops, -one.support))
+        left_out += len(ranked) - room
+        offered = tuple(ranked[:room])
+    left_out += len(routines) - len(found)
+    offered = (*found, *offered)
     notes = (f"{left_out} more, less supported suggestions are left out",) if left_out else ()
     return offered, notes
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 if TYPE_CHECKING:
     from ros_processes import Peer
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 # A slow machine is no failure, and the first example pays for imports.
-settings.register_profile("rebt_ros", deadline=None)
+settings.register_profile("rebt_ros", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("rebt_ros")
 
 

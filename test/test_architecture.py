@@ -35,6 +35,7 @@ LAYERS: Final = (
     {"selection", "options"},
     {"evaluation", "pictures", "simulation", "storage"},
     {"algorithms"},
+    {"routines"},
     {"decision_tree"},
     {"edit_distance"},
     {"behavior_tree"},
@@ -65,6 +66,7 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 
 #: Libraries with a home: the only modules that import them.
 HOMES: Final = {
+    "apsw": ("rebt_ros.storage.bag_safety",),
     "distributed": ("rebt_ros.experiment.workers",),
     "imblearn": ("rebt_ros.decision_tree.upsampling",),
     "jsonschema": (),

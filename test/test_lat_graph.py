@@ -28,7 +28,7 @@ from lat_examples import (
 from rebt_ros.algorithms import lat_cycles
 from rebt_ros.algorithms.lat_cycles import Acyclic, CycleStart, remove_cycles
 from rebt_ros.algorithms.lat_graph import ActionNode, CycleNode, LatGraph, generate_graph
-from rebt_ros.algorithms.lat_occurrences import Occurrences, Runs, runs
+from rebt_ros.algorithms.lat_occurrences import Occurrences, Runs, rows, runs
 from rebt_ros.algorithms.lat_paths import source_to_sink_paths
 from rebt_ros.algorithms.rules import Rule
 
@@ -100,6 +100,11 @@ def test_runs_are_the_actions_of_each_demonstration_with_repetitions_as_one() ->
     assert runs(table) == (("go", "turn", "go"), ("go", "turn"))
 
 
+def test_rows_are_the_actions_of_each_demonstration() -> None:
+    table = some.table([[0, 0, 0, 0]] * 7, [0, 0, 2, 0, 0, 0, 2], [0, 0, 0, 0, 1, 1, 1])
+    assert rows(table) == (("go", "go", "turn", "go"), ("go", "go", "turn"))
+
+
 def test_a_path_occurs_inside_one_demonstration_without_gaps() -> None:
     shown = Occurrences((tuple("abca"), tuple("bacb")))
     assert shown.count([node("a"), node("b")]) == 1
@@ -127,6 +132,11 @@ def test_a_cycle_can_be_left_in_the_middle_of_its_last_pass_but_not_of_its_first
 
 def test_a_nested_cycle_is_passed_once_or_more_in_each_pass() -> None:
     assert Occurrences((tuple("ababcabc"),)).count([cycle(cycle("a", "b"), "c")]) == 1
+
+
+def test_an_occurrence_is_followed_to_its_end_however_long_it_is() -> None:
+    word = tuple("ab" * 700 + "c" + "ab" * 3)
+    assert Occurrences((word,)).count([cycle("a", "b")]) == 2
 
 
 some_paths = st.lists(

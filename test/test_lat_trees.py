@@ -32,7 +32,7 @@ from py_trees.common import Status
 from rebt_ros.algorithms.lat_cycles import CycleStart, remove_cycles
 from rebt_ros.algorithms.lat_graph import generate_graph
 from rebt_ros.algorithms.lat_occurrences import Occurrences, Runs
-from rebt_ros.algorithms.lat_trees import LatTree, LeftOut, gen_lat_trees
+from rebt_ros.algorithms.lat_trees import Demonstrated, LatTree, LeftOut, gen_lat_trees
 from rebt_ros.algorithms.re_bt_espresso import build_inv_set
 from rebt_ros.algorithms.rules import Rule
 from rebt_ros.behavior_tree import nodes
@@ -250,6 +250,64 @@ def test_a_complete_graph_of_30_actions_takes_about_a_second() -> None:
         # The slowest machine of many that run tests side by side.
         assert time.process_time() - start < 5
         assert all(nodes.depth(one.subtree) < DEEPEST_TREE for one in trees)
+
+
+# --- single loops -------------------------------------------------------------------------------
+
+
+def loops(rules: Iterable[Rule], *shown: str, most: int = 9) -> list[tuple[str, int]]:
+    """The actions of the single loops and their support."""
+    found = gen_lat_trees(rules, tuple(map(tuple, shown)), most_loops=most).loops
+    return [("".join(flat_labels(one)), one.support) for one in found]
+
+
+def flat_labels(tree: LatTree) -> list[str]:
+    return [label for each in flat(tree.path) for label in each.labels]
+
+
+def test_an_action_that_was_done_twice_in_a_row_is_a_loop_that_tests_its_whole_rule() -> None:
+    rules = [rule("a", [c(0)], [c(1), lat("b")]), rule("b", [c(2)])]
+    (tree,) = gen_lat_trees(rules, (tuple("aabaaabb"), ("b",)), most_loops=1).loops
+    assert tree.support == 2
+    assert tree.subtree == repeater(either((c(0),), (c(1), lat_of("b", "a"))), "a")
+    assert loops(rules, "aabaaabb", "b") == [("a", 2), ("b", 1)]
+
+
+def test_an_action_at_the_end_and_the_beginning_of_demonstrations_is_no_loop() -> None:
+    assert loops([rule("a", [c(0)]), rule("b", [c(1)])], "ba", "ab") == []
+
+
+def test_members_of_a_group_in_a_row_are_a_loop_of_the_group() -> None:
+    assert loops([rule(("a", "b"), [c(0)]), rule("d", [c(1)])], "dabad") == [("ab", 1)]
+
+
+def test_a_simple_cycle_within_others_is_a_loop_of_its_own() -> None:
+    rules = followers({"a": "bc", "b": "a", "c": "a"})
+    # Each way back from a to a, and from the other one to itself.
+    assert loops(rules, "abababacaca") == [("ab", 5), ("ac", 3)]
+
+
+def test_a_path_that_was_done_twice_in_a_row_is_a_loop() -> None:
+    rules = [rule("a", [c(0), ~lat("d")]), rule("b", [c(1), lat("a")]), rule("d", [c(2)])]
+    assert loops(rules, "dababd", "ab") == [("ab", 1)]
+    assert loops(rules, "dabdab", "ab") == []
+
+
+def test_loops_beyond_the_number_asked_for_are_counted() -> None:
+    rules = [rule("a", [c(0)]), rule("b", [c(1)])]
+    assert loops(rules, "aabb", most=0) == []
+    assert gen_lat_trees(rules, (tuple("aabb"),), most_loops=1).left_out == LeftOut(loops=1)
+
+
+@given(rule_lists(), shown_runs)
+def test_what_is_remembered_of_demonstrations_changes_no_tree(
+    rules: list[Rule], shown: Runs
+) -> None:
+    remembering = Demonstrated(shown)
+    for some_rules in (rules, rules[1:], rules):
+        assert gen_lat_trees(some_rules, remembering, most_loops=9) == gen_lat_trees(
+            some_rules, shown, most_loops=9
+        )
 
 
 # --- executed -----------------------------------------------------------------------------------

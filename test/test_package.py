@@ -35,7 +35,7 @@ DECLARED_AS: Final = {
 }
 
 #: Imported only where they are installed.
-OPTIONAL: Final = {"distributed", "imblearn", "matplotlib"}
+OPTIONAL: Final = {"apsw", "distributed", "imblearn", "matplotlib"}
 
 needs_installation = pytest.mark.skipif(
     INSTALLED == CHECKOUT / PACKAGE, reason="run from the checkout, not by 'make test'"
@@ -162,9 +162,9 @@ def test_every_node_begins_where_signals_are_heard_at_once() -> None:
 def test_the_parameter_files_are_installed() -> None:
     ament_index_python = pytest.importorskip("ament_index_python")
     share = Path(ament_index_python.get_package_share_directory(PACKAGE))
-    shipped = {path.name for path in (CHECKOUT / "config").glob("*.yaml")}
+    shipped = {path.name for path in (CHECKOUT / "config").iterdir()}
     assert {path.name for path in (share / "config").glob("*")} == shipped
-    assert {"executor.yaml", "learner.yaml", "recorder.yaml"} <= shipped
+    assert {"executor.yaml", "learner.yaml", "recorder.yaml", "sros2_policy.xml"} <= shipped
 
 
 @pytest.mark.parametrize("path", CORE, ids=_module_name)

@@ -151,8 +151,22 @@ def test_a_new_length_is_accepted_by_a_new_demonstration_only() -> None:
     desk.session.act(3, "action", "go")
     assert desk.faults == ["unexpected length"]
     desk.session.renew(4)
-    desk.session.act(5, "action", "go")
+    desk.session.observe(5, "state", [1.0, 2.0], [])
+    desk.session.act(6, "action", "go")
     assert desk.rows() == [[("go", None, (1.0,))], [("go", None, (1.0, 2.0))]]
+
+
+@pytest.mark.parametrize("bad", [[1.0, 2.0], [float("nan")], []])
+def test_a_demonstration_does_not_begin_with_a_message_that_was_refused(bad: list[float]) -> None:
+    desk = Desk()
+    desk.session.start(0)
+    desk.session.observe(1, "state", [1.0], ["x"])
+    desk.session.observe(2, "state", bad, [])
+    desk.session.renew(3)
+    desk.session.observe(4, "state", [3.0], [])
+    desk.session.act(5, "action", "go")
+    assert desk.rows() == [[("go", None, (3.0,))]]
+    assert desk.disk.files[0].features[0].name == "x"
 
 
 def test_names_from_the_first_message_hold_for_later_demonstrations() -> None:

@@ -7,11 +7,12 @@ that is left, one that a depth-first search meets.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
-from itertools import groupby, islice
+from itertools import islice
 from typing import TypeAlias, TypeVar
 
 import networkx as nx
@@ -41,6 +42,15 @@ class CycleStart(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class ClosedCycle:
+    """A simple cycle of action nodes that the demonstrations closed."""
+
+    cycle: CycleNode
+    times: int
+    """How often they came back to one of its nodes by way of the others."""
+
+
+@dataclass(frozen=True, slots=True)
 class Acyclic:
     """A graph without cycles, and what was left out to get it."""
 
@@ -49,6 +59,9 @@ class Acyclic:
     """Edges from a PSA group to itself: choosing once more among its actions is no new step."""
     edges: int = 0
     """Edges of cycles that would have been nested deeper than `DEEPEST_NESTING`."""
+    closed: tuple[ClosedCycle, ...] = ()
+    """Cycles of the graph as it was, without self-loops: those that the demonstrations closed, the
+    most frequent first (see `MOST_LOOPS`)."""
 
 
 def remove_cycles(
@@ -66,10 +79,11 @@ def remove_cycles(
         start: Which node a cycle starts with.
     """
     work = _Work(graph, occurrences)
+    closed = tuple(ClosedCycle(work.cycle_node(one, start), n) for one, n in work.closed_cycles())
     while (cycle := work.next_cycle()) is not None:
         work.collapse(cycle, start)
     edges = work.drop_back_edges()
-    return Acyclic(work.result(), work.self_loops, edges)
+    return Acyclic(work.result(), work.self_loops, edges, closed)
 
 
 class _Work:
@@ -87,44 +101,58 @@ class _Work:
         for number, node in self._nodes.items():
             for label in node.labels:
                 owners.setdefault(label, []).append(number)
-        self._shown = [
-            _contracted(tuple(owners.get(label, ())) for label in demonstration)
+        self._closed: list[tuple[_Cycle, int]] | None = None
+        self._shown = _Steps(
+            [tuple(owners.get(label, ())) for label in demonstration]
             for demonstration in occurrences.shown
-        ]
+        )
 
-    def next_cycle(self) -> _Cycle | None:
-        """The cycle to collapse now; None where there is none that may still be nested."""
-        loops = Counter(loop for shown in self._shown for loop in _loops(shown))
+    def closed_cycles(self) -> list[tuple[_Cycle, int]]:
+        """Cycles that the demonstrations closed and how often, the most frequent first."""
+        if self._closed is None:
+            self._closed = self._find_closed()
+        return self._closed
+
+    def _find_closed(self) -> list[tuple[_Cycle, int]]:
         cycles = (
             (cycle, times)
-            for loop, times in _most_frequent(loops)
+            for loop, times in _most_frequent(self._shown.loops())
             if (cycle := self._as_cycle(loop)) is not None
         )
         closed: Counter[_Cycle] = Counter()
         for cycle, times in islice(cycles, MOST_LOOPS):
             closed[cycle] += times
-        if closed:
-            return _most_frequent(closed)[0][0]
+        return _most_frequent(closed)
+
+    def next_cycle(self) -> _Cycle | None:
+        """The cycle to collapse now; None where there is none that may still be nested."""
+        if nx.is_directed_acyclic_graph(self._engine):
+            return None
+        if closed := self.closed_cycles():
+            return closed[0][0]
         try:
             return tuple(edge[0] for edge in nx.find_cycle(self._of_shallow_nodes()))
         except nx.NetworkXNoCycle:
             return None
 
+    def cycle_node(self, cycle: _Cycle, start: CycleStart) -> CycleNode:
+        """The cycle node that a cycle becomes."""
+        return CycleNode(tuple(self._nodes[number] for number in self._from_start(cycle, start)))
+
     def collapse(self, cycle: _Cycle, start: CycleStart) -> None:
         """Replaces the nodes of the cycle by a cycle node, to which their edges move."""
-        path = tuple(self._nodes[number] for number in self._from_start(cycle, start))
+        node = self.cycle_node(cycle, start)
         number = max(self._nodes) + 1
         before = [one for member in cycle for one in self._engine.predecessors(member)]
         after = [one for member in cycle for one in self._engine.successors(member)]
-        self._nodes[number] = CycleNode(path)
+        self._nodes[number] = node
         self._rank[number] = min(self._rank[member] for member in cycle)
         self._engine.add_node(number)
         self._engine.add_edges_from((one, number) for one in before if one not in cycle)
         self._engine.add_edges_from((number, one) for one in after if one not in cycle)
         self._engine.remove_nodes_from(cycle)
-        distinct = {owners for shown in self._shown for owners in shown}
-        renamed = {owners: _renamed(owners, cycle, number) for owners in distinct}
-        self._shown = [_contracted(map(renamed.__getitem__, shown)) for shown in self._shown]
+        self._shown.collapse(cycle, number)
+        self._closed = None
 
     def drop_back_edges(self) -> int:
         """Removes what closes cycles in a depth-first search, and tells how many edges that is."""
@@ -198,9 +226,55 @@ class _Work:
         return -self._occurrences.count(path), self._occurrences.first(path)
 
 
-def _contracted(shown: Iterable[_Owners]) -> list[_Owners]:
-    """Neighbouring runs of the same nodes as one: inside a cycle node nothing new begins."""
-    return [owners for owners, _ in groupby(shown)]
+class _Steps:
+    """The demonstrations as nodes that follow each other, neighbours differ.
+
+    Inside a cycle node nothing new begins.  Which nodes a run can be of is a letter, so that the
+    demonstrations are texts, in which loops are cut out and counted quickly.
+    """
+
+    def __init__(self, shown: Iterable[list[_Owners]]) -> None:
+        demonstrations = list(shown)
+        distinct = {owners for demonstration in demonstrations for owners in demonstration}
+        self._owners = sorted(distinct)
+        letters = _letters(self._owners)
+        self._texts = [
+            _contracted("".join(map(letters.__getitem__, demonstration)))
+            for demonstration in demonstrations
+        ]
+
+    def loops(self) -> Counter[tuple[_Owners, ...]]:
+        """Each way back to a run's nodes by way of distinct other ones, and how often it was taken.
+
+        The smallest nodes come first.
+        """
+        nobody = _letters(self._owners).get((), "")
+        taken: Counter[str] = Counter()
+        for text in self._texts:
+            taken.update(_ways_back(text, nobody))
+        loops: Counter[tuple[_Owners, ...]] = Counter()
+        for way, times in taken.items():
+            smallest = way.index(min(way))
+            turned = way[smallest:] + way[:smallest]
+            loops[tuple(self._owners[ord(letter)] for letter in turned)] += times
+        return loops
+
+    def collapse(self, cycle: _Cycle, number: int) -> None:
+        """Replaces the nodes of the cycle by the one with the number."""
+        renamed = [_renamed(owners, cycle, number) for owners in self._owners]
+        self._owners = sorted(set(renamed))
+        letters = _letters(self._owners)
+        table = {place: letters[owners] for place, owners in enumerate(renamed)}
+        self._texts = [_contracted(text.translate(table)) for text in self._texts]
+
+
+def _letters(owners: list[_Owners]) -> dict[_Owners, str]:
+    """Letters in the order of what they stand for."""
+    return {one: chr(place) for place, one in enumerate(owners)}
+
+
+def _contracted(text: str) -> str:
+    return re.sub(r"(?s)(.)\1+", r"\1", text)
 
 
 def _renamed(owners: _Owners, cycle: _Cycle, number: int) -> _Owners:
@@ -208,21 +282,22 @@ def _renamed(owners: _Owners, cycle: _Cycle, number: int) -> _Owners:
     return owners if len(kept) == len(owners) else (*kept, number)
 
 
-def _loops(shown: list[_Owners]) -> Iterator[tuple[_Owners, ...]]:
-    """Each way back to a run's nodes by way of distinct other ones, its smallest first."""
-    last_at: dict[_Owners, int] = {}
+def _ways_back(text: str, nobody: str) -> Iterator[str]:
+    """Parts of the text from a letter to its next occurrence in which no letter is twice.
+
+    A run of nobody's breaks off every way.
+    """
+    last_at: dict[str, int] = {}
     distinct_since = 0
-    for place, owners in enumerate(shown):
-        if not owners:
+    for place, letter in enumerate(text):
+        if letter == nobody:
             distinct_since = place + 1
             continue
-        before = last_at.get(owners, -1)
+        before = last_at.get(letter, -1)
         if before >= distinct_since:
-            loop = tuple(shown[before:place])
-            smallest = loop.index(min(loop))
-            yield loop[smallest:] + loop[:smallest]
-        distinct_since = max(distinct_since, before + 1)
-        last_at[owners] = place
+            yield text[before:place]
+            distinct_since = before + 1
+        last_at[letter] = place
 
 
 def _most_frequent(counted: Counter[tuple[_T, ...]]) -> list[tuple[tuple[_T, ...], int]]:

@@ -17,6 +17,7 @@ from rebt_ros.behavior_tree.learned_tree import Root, Suggestion, SuggestionKind
 from rebt_ros.errors import OptionError
 from rebt_ros.logic.conditions import Literal
 from rebt_ros.logic.factoring import pull_out_common
+from rebt_ros.routines.finding import FoundRoutine
 
 #: Stands for the ids of all suggestions.
 ALL = "all"
@@ -62,6 +63,20 @@ def lat_suggestions(trees: Iterable[LatTree]) -> tuple[Suggestion, ...]:
             tree.subtree,
         )
         for tree in trees
+    )
+
+
+def routine_suggestions(found: Iterable[FoundRoutine]) -> tuple[Suggestion, ...]:
+    """Routines in their order."""
+    return _numbered(
+        (
+            SuggestionKind.REPEATER
+            if isinstance(one.subtree, nodes.Repeater)
+            else SuggestionKind.SEQUENCE,
+            one.support,
+            one.subtree,
+        )
+        for one in found
     )
 
 

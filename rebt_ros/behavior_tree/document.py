@@ -51,7 +51,10 @@ VERSION = 2
 _READ = (1, VERSION)
 
 #: Longest document that is read, in characters.
-LARGEST_DOCUMENT = 16_000_000
+LARGEST_DOCUMENT = 4_000_000
+#: Most values that a document may hold, counted by its commas and opening brackets: a tree of about
+#: 20,000 nodes.  A running executor reads documents between two ticks.
+MOST_VALUES = 150_000
 #: Longest way from a tree's root to a leaf, in nodes.
 DEEPEST_TREE = 100
 
@@ -96,6 +99,9 @@ def loads(text: str) -> LearnedTree:
         raise DocumentError(
             f"the document has {len(text)} characters: at most {LARGEST_DOCUMENT} are read."
         )
+    values = sum(map(text.count, ",[{"))
+    if values > MOST_VALUES:
+        raise DocumentError(f"the document has {values} values: at most {MOST_VALUES} are read.")
     try:
         return _learned_tree(_Place(_json(text), "document"))
     except RecursionError as err:

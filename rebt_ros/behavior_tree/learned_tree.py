@@ -18,6 +18,10 @@ class SuggestionKind(Enum):
     PSA = "psa"
     LAT_SEQUENCE = "lat_sequence"
     LAT_REPEATER = "lat_repeater"
+    SEQUENCE = "sequence"
+    """A routine, found in rows that share one state."""
+    REPEATER = "repeater"
+    """A routine that is gone through again and again."""
 
 
 @dataclass(frozen=True, slots=True)

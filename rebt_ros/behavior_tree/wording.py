@@ -182,6 +182,8 @@ def heading(suggestion: Suggestion) -> str:
         SuggestionKind.PSA: "Parallel or Selector",
         SuggestionKind.LAT_SEQUENCE: "LAT Sequence",
         SuggestionKind.LAT_REPEATER: "LAT Repeater",
+        SuggestionKind.SEQUENCE: "Sequence",
+        SuggestionKind.REPEATER: "Repeater",
     }[suggestion.kind]
     return f"Suggestion {_name(suggestion.id)}: {kind}, shown {_count(suggestion.support, 'time')}"
 

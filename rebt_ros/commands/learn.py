@@ -127,6 +127,12 @@ def _parser() -> argparse.ArgumentParser:
             help=_REDUCTIONS[reduction.name],
         )
     learning.add_argument(
+        "--no-routines",
+        dest="routines",
+        action="store_false",
+        help="look for no Sequences and Repeaters in rows that share one state",
+    )
+    learning.add_argument(
         "--test-fraction",
         type=float,
         default=defaults.test_fraction,
@@ -195,6 +201,7 @@ def _options(parsed: argparse.Namespace) -> LearnOptions:
         refit=parsed.refit,
         attach=tuple(parsed.attach),
         psa_choice=parsed.psa_as,
+        routines=parsed.routines and not parsed.paper,
         random_state=parsed.random_state,
         lags=parsed.lags,
         upsample=parsed.upsample,

@@ -5,9 +5,11 @@ All modes share one decision tree, as in the paper: with LAT, of depth 5, from a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from rebt_ros.algorithms.lat_trees import Demonstrated
 from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
 from rebt_ros.algorithms.suggestions import ALL
 from rebt_ros.behavior_tree import nodes
@@ -17,6 +19,7 @@ from rebt_ros.decision_tree.tree import DecisionTree
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.experiment.settings import MAX_DEPTH, MOST_SUGGESTIONS
 from rebt_ros.options import DEFAULTS, LearnOptions
+from rebt_ros.routines.finding import FoundRoutine
 from rebt_ros.suggesting import accept, suggest
 
 
@@ -65,7 +68,13 @@ def plain_tree(mode: Mode, tree: DecisionTree, main: nodes.Node) -> nodes.Node:
 
 
 def offer(
-    mode: Mode, table: DemonstrationTable, trained: TrainedTree, main: nodes.Node, ccp_alpha: float
+    mode: Mode,
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    main: nodes.Node,
+    ccp_alpha: float,
+    routines: Sequence[FoundRoutine],
+    demonstrated: Demonstrated,
 ) -> Offer:
     """The generated subtrees of a pruning level.
 
@@ -75,17 +84,19 @@ def offer(
         trained: The decision tree, pruned.
         main: What `main_tree` made of it.
         ccp_alpha: How far it is pruned.
+        routines: What was found in the table, for the default.
+        demonstrated: What was done in the table.
     """
     if mode is Mode.BASELINE:
         return Offer(under_root(main), 0)
     if mode is Mode.PAPER:
         options = replace(LearnOptions.paper(), attach=(ALL,))
-        suggestions, _ = suggest(table, trained, ccp_alpha, options)
+        suggestions, _ = suggest(table, trained, ccp_alpha, options, demonstrated=demonstrated)
         attached, _ = accept(main, suggestions, options)
         # A single rule gets a root once something is attached.
         return Offer(under_root(attached), len(suggestions))
     options = replace(DEFAULTS, max_depth=MAX_DEPTH)
-    suggestions, _ = suggest(table, trained, ccp_alpha, options)
+    suggestions, _ = suggest(table, trained, ccp_alpha, options, routines, demonstrated)
     if len(suggestions) > MOST_SUGGESTIONS:
         raise AssertionError(f"{len(suggestions)} suggestions by default")
     subtrees = tuple(one.subtree for one in suggestions)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from random import Random
 
+from rebt_ros.algorithms.lat_trees import Demonstrated
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.decision_tree.training import TrainedTree, fit
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
@@ -29,8 +30,11 @@ from rebt_ros.experiment.results import (
 from rebt_ros.experiment.scores import ComparedTree, Distances, comparable, score
 from rebt_ros.experiment.settings import MAX_DEPTH, Settings
 from rebt_ros.experiment.words import one_line
+from rebt_ros.options import DEFAULTS
+from rebt_ros.routines.finding import FoundRoutine
 from rebt_ros.simulation.experiment_config import ExperimentConfig, as_behavior_tree
 from rebt_ros.simulation.experiment_robot import ExperimentRobot, published_variables, simulate
+from rebt_ros.suggesting import demonstrated_in, routines_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,19 +106,27 @@ def _levels(table: DemonstrationTable) -> dict[Mode, list[_Level]]:
     if len(table.actions) < 2:
         return made
     fitted = fit(table, last_action=True, max_depth=MAX_DEPTH)
+    routines = routines_of(table, DEFAULTS)
+    demonstrated = demonstrated_in(table)
     for ccp_alpha in fitted.path.alphas.tolist():
         trained = fitted.at(ccp_alpha)
         baseline = Size.of(main_tree(Mode.BASELINE, trained))
         for mode, levels in made.items():
-            levels.append(_level(mode, table, trained, ccp_alpha, baseline))
+            levels.append(_level(mode, table, trained, ccp_alpha, baseline, routines, demonstrated))
     return made
 
 
 def _level(
-    mode: Mode, table: DemonstrationTable, trained: TrainedTree, ccp_alpha: float, baseline: Size
+    mode: Mode,
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    ccp_alpha: float,
+    baseline: Size,
+    routines: Sequence[FoundRoutine],
+    demonstrated: Demonstrated,
 ) -> _Level:
     main = main_tree(mode, trained)
-    offered = offer(mode, table, trained, main, ccp_alpha)
+    offered = offer(mode, table, trained, main, ccp_alpha, routines, demonstrated)
     # Of trees whose leaves all choose one action, BT-Espresso makes a single node as well.
     decides = len({leaf.most_probable for _, leaf in trained.tree.paths()}) > 1
     sizes = (

@@ -32,6 +32,8 @@ from rebt_ros.storage.tree_file import write_tree
 
 _LEVELS, _SUMMARY = "levels", "summary.json"
 _PLOT = "accuracy_vs_alpha"
+#: Longest directory of a channel (characters); its name in full is in the documents.
+_LONGEST_NAME = 100
 #: Families that take more room say so.
 _MENTIONED_MEGABYTES = 50
 _LEVEL_FILES = (
@@ -77,7 +79,10 @@ def channel_directories(learnings: Sequence[Learning]) -> Iterator[tuple[Path, L
     taken: set[str] = set()
     for learning in learnings:
         # Channels are topics, whose slashes would make directories of their own.
-        name = re.sub("[^A-Za-z0-9_-]+", "_", learning.table.channel).strip("_") or "channel"
+        name = (
+            re.sub("[^A-Za-z0-9_-]+", "_", learning.table.channel).strip("_")[:_LONGEST_NAME]
+            or "channel"
+        )
         while name in taken:
             name += "_"
         taken.add(name)

@@ -59,6 +59,15 @@ class CommandChannels:
         self._not_understood = not_understood
         self._channels: dict[str, _Channel] = {}
 
+    def topics_of(self, channels: Sequence[str]) -> list[str]:
+        """The topics that following these channels takes.
+
+        Raises:
+            DocumentError: A channel's name cannot be part of a topic's name.
+        """
+        bases = ["command", self._result_topic] if self._result_topic else ["command"]
+        return [topic_of(base, channel, channels) for base in bases for channel in channels]
+
     def follow(self, channels: Sequence[str]) -> None:
         """Makes these the channels.
 

@@ -31,6 +31,7 @@ from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.executor_settings import declare_settings
 from rebt_ros.ros.novelty_guard import NoveltyGuard
 from rebt_ros.ros.takeover import Takeover, channel_of
+from rebt_ros.ros.topic_names import check_topics
 from rebt_ros.ros.tree_inputs import Message
 from rebt_ros.ros.tree_program import Preparation, TreeProgram
 from rebt_ros.storage.tree_file import read_tree
@@ -103,14 +104,16 @@ class ExecutorNode(Node):
             self._jumps = self._time.create_jump_callback(
                 back, post_callback=self._on_clock_set_back
             )
-        if self._settings.tree_file is not None:
-            learned = read_tree(self._settings.tree_file)
-            self._install(self._preparation.program(learned, dumps(learned)))
         ready = self.create_guard_condition(self._take_prepared)
         self._background = Background(self._preparation.read, ready.trigger)
         self.create_subscription(String, "behavior_tree", self._on_document, _TREE_QOS)
         for topic in self._settings.takeover.topics:
             self.create_subscription(String, topic, partial(self._on_person, topic), 10)
+        if self._settings.tree_file is not None:
+            learned = read_tree(self._settings.tree_file)
+            program = self._preparation.program(learned, dumps(learned))
+            self._check_topics(program)
+            self._install(program)
         self.create_service(SetBool, "~/enable", self._enable)
         self.create_timer(1.0 / self._settings.rate, self._tick, clock=self._time)
         self.create_timer(_SNAPSHOT_PERIOD, self._publish_snapshot, clock=steady)
@@ -140,10 +143,23 @@ class ExecutorNode(Node):
             elif self._program is not None and prepared.document == self._program.document:
                 self._preparation.retire(prepared)
             else:
-                self._discard_candidate()
-                self._candidate = prepared
-                self._subscribe()
+                self._propose(prepared)
         self._try_candidate()
+
+    def _propose(self, program: TreeProgram) -> None:
+        """Makes a program the candidate, if there can be topics of the names in it."""
+        try:
+            self._check_topics(program)
+        except DocumentError as err:
+            self._preparation.retire(program)
+            self._refuse(str(err))
+            return
+        self._discard_candidate()
+        self._candidate = program
+        self._subscribe()
+
+    def _check_topics(self, program: TreeProgram) -> None:
+        check_topics(self, program.inputs.topics, self._channels.topics_of(program.channels))
 
     def _refuse(self, why: str) -> None:
         kept = "the tree before it stays" if self._program else "there is no tree yet"

@@ -93,6 +93,8 @@ class RecordingSession:
         DemonstrationBuilder(self._topics, self._channels, sample_rate)
         self._watch = TakeoverWatch(self._channels)
         self._latest: dict[str, _Message] = {}
+        # Topics whose last message was refused.
+        self._unclear: set[str] = set()
         self._held: dict[str, str] = {}
         self._builder: DemonstrationBuilder | None = None
         self._writer: Writer | None = None
@@ -127,10 +129,18 @@ class RecordingSession:
         if not labels and before is not None and len(before.labels) == len(values):
             # Some publishers name their fields in the first message only.
             labels = before.labels
-        self._latest[topic] = _Message(stamp, values, labels)
-        if self._builder is not None:
-            with self._noting_faults():
-                self._write(self._builder.observe(stamp, topic, values, labels))
+        message = _Message(stamp, values, labels)
+        if self._builder is None:
+            self._latest[topic] = message
+            return
+        with self._noting_faults():
+            # What is refused may be an intruder or the first of a new length: a demonstration to
+            # come begins with neither of both kinds, but with the message after it.
+            self._unclear.add(topic)
+            rows = self._builder.observe(stamp, topic, values, labels)
+            self._unclear.discard(topic)
+            self._latest[topic] = message
+            self._write(rows)
 
     def act(self, stamp: int, channel: str, label: str) -> None:
         """Takes an action message (see `DemonstrationBuilder.act`)."""
@@ -219,6 +229,8 @@ class RecordingSession:
         """Starts a demonstration that knows the present state, and of the past only `before`."""
         builder = DemonstrationBuilder(self._topics, self._channels, self._sample_rate, before)
         for topic, (when, values, labels) in self._latest.items():
+            if topic in self._unclear:
+                continue
             with contextlib.suppress(BadMessageError):
                 builder.observe(when, topic, values, labels)
         if self._sample_rate is not None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from operator import itemgetter
@@ -26,6 +26,7 @@ from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.fields import fields_of
 from rebt_ros.errors import InputError, RebtError
+from rebt_ros.storage.bag_safety import check_bag, check_expansion, expansion, guarded_databases
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.text import unreadable
 
@@ -65,7 +66,7 @@ def read_bag(
         OptionError: A topic is named twice, or the sample rate is not positive.
     """
     with _opened(path) as reader:
-        kinds = _topics(reader)
+        kinds = _topics(path, reader)
         if not kinds:
             raise InputError(f"{path} holds no messages: record state and action topics first.")
         names = [one.name for one in state_topics]
@@ -248,8 +249,9 @@ class _States:
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[Reader]:
-    with _explained(path):
+    with _explained(path), guarded_databases():
         reader = Reader(path)
+        check_bag(path, METADATA)
         reader.open()
     try:
         yield reader
@@ -262,7 +264,7 @@ def _messages(
 ) -> Iterator[tuple[Connection, int, bytes]]:
     """The messages by the time at which they were recorded, those of one instant as they stand."""
     with _explained(path):
-        messages = reader.messages(wanted)
+        messages = _unpacked_in_bounds(path, reader, wanted)
         # Files are read one after the other, each in the order of time, and where the recorder went
         # from one to the next their times may overlap.
         several = path.is_dir() and len(list(filter(_holds_messages, path.iterdir()))) > 1
@@ -272,6 +274,47 @@ def _messages(
 def _holds_messages(path: Path) -> bool:
     """Whether it is a file of a bag's messages, compressed or not."""
     return any(suffix in STORAGE_SUFFIXES for suffix in path.suffixes)
+
+
+def _unpacked_in_bounds(
+    path: Path, reader: Reader, wanted: Sequence[Connection]
+) -> Iterator[tuple[Connection, int, bytes]]:
+    """The messages as rosbags has them; those of too much compressed data are refused."""
+    if reader.compression_mode == "message":
+        storages = cast(_Directory, reader.storage).storages
+        storages[:] = [_BoundedStorage(path, one) for one in storages]
+    yield from reader.messages(wanted)
+
+
+class _Storage(Protocol):
+    connections: list[Connection]
+
+    def messages(
+        self, connections: Collection[Connection], start: int | None, stop: int | None
+    ) -> Iterator[tuple[Connection, int, bytes]]: ...
+
+
+class _Directory(Protocol):
+    storages: list[_Storage]
+
+
+class _BoundedStorage:
+    """A file of compressed messages whose sizes are looked at before they are unpacked."""
+
+    def __init__(self, path: Path, storage: _Storage) -> None:
+        self._path = path
+        self._storage = storage
+        self.connections = storage.connections
+
+    def messages(
+        self, connections: Collection[Connection], start: int | None, stop: int | None
+    ) -> Iterator[tuple[Connection, int, bytes]]:
+        unpacked = size = 0
+        for connection, stamp, data in self._storage.messages(connections, start, stop):
+            unpacked += expansion(data)
+            size += len(data)
+            check_expansion(self._path, unpacked, size)
+            yield connection, stamp, data
 
 
 @contextlib.contextmanager
@@ -300,11 +343,14 @@ def _explanation(path: Path, err: Exception) -> InputError:
     )
 
 
-def _topics(reader: Reader) -> dict[str, str]:
+def _topics(path: Path, reader: Reader) -> dict[str, str]:
     """Type of each topic that has messages; empty where its publishers differ."""
-    return {
-        name: info.msgtype or "" for name, info in sorted(reader.topics.items()) if info.msgcount
-    }
+    for one in reader.connections:
+        if not isinstance(one.topic, str) or not isinstance(one.msgtype, str):
+            raise InputError(f"{path} has a topic or type that is no text: record it again.")
+    with _explained(path):
+        topics = sorted(reader.topics.items())
+    return {name: info.msgtype or "" for name, info in topics if info.msgcount}
 
 
 def _chosen(

@@ -17,6 +17,8 @@ def read_text(path: Path) -> str:
         data = path.read_bytes()
     except OSError as err:
         raise unreadable(path, err) from err
+    except ValueError as err:
+        raise InputError(f"{str(path)!r} is no name of a file: check it.") from err
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as err:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import stat
 from pathlib import Path
 
@@ -22,8 +23,10 @@ def read_tree(path: Path) -> LearnedTree:
         InputError: There is no such text file.
         DocumentError: It is not a valid document.
     """
-    if path.is_file() and path.stat().st_size > _LARGEST_FILE:
-        raise DocumentError(f"{path} has more than {_LARGEST_FILE} bytes: this is no document.")
+    # What is no file, or no name of one, is told by reading it.
+    with contextlib.suppress(OSError, ValueError):
+        if path.is_file() and path.stat().st_size > _LARGEST_FILE:
+            raise DocumentError(f"{path} has more than {_LARGEST_FILE} bytes: this is no document.")
     text = read_text(path)
     try:
         return loads(text)

@@ -1,0 +1,254 @@
+"""Finds routines in a demonstration table and makes subtrees of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.routines.corpus import LONGEST_WORD, corpus
+from rebt_ros.routines.guards import Guard, guard, holds
+from rebt_ros.routines.likelihood import Model, State
+from rebt_ros.routines.moments import Moments, moments
+from rebt_ros.routines.program import Place, Routine
+from rebt_ros.routines.search import programs
+
+#: Share of the rows that must follow another one in the same moment for routines to be looked for,
+#: and how many such rows there must be.
+_LEAST_TOGETHER = 0.05
+_FEWEST_TOGETHER = 100
+#: Rounds of expectation maximization before guards are learned.
+_THOROUGH = 10
+#: Programs of which routines are offered, the best ones.
+_MOST_PROGRAMS = 3
+#: Events that tell what another round depends on.
+_FEWEST_ROUNDS = 100
+#: How often a step must follow in the same moment; its guard may contradict the one before, and
+#: then it never does.
+_FEWEST_PASSED = 30
+#: How much rarer going on must be where a guard does not hold: within a stream, and at its
+#: beginning, which may also have been waited for while the state changed.
+_CONTRAST, _CONTRAST_AT_BEGINNING = 0.6, 0.72
+
+
+@dataclass(frozen=True, slots=True)
+class FoundRoutine:
+    """A Sequence or Repeater that the demonstrator seems to have followed."""
+
+    subtree: nodes.Sequence | nodes.Repeater
+    support: int
+    """How often it was ended."""
+    rows: int
+    """How many rows it explains."""
+
+
+def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:
+    """Routines of the program that explains best what was done in each state.
+
+    There is something to find only where several actions were done in one state: what is done in
+    one state has one reason, so that its order shows what belongs together, and its presence on
+    what it depends.
+
+    Args:
+        table: The rows that were learned from.
+
+    Returns:
+        Those that explain the most rows first; routines of the best program come before the others.
+    """
+    shown = moments(table)
+    together = shown.rows - len(shown)
+    if together < max(_FEWEST_TOGETHER, _LEAST_TOGETHER * len(table)) or len(shown.actions) < 2:
+        return ()
+    read = corpus(shown)
+    offered: dict[nodes.Node, FoundRoutine] = {}
+    for program in programs(shown, read)[:_MOST_PROGRAMS]:
+        model = Model(program, read)
+        model.fit(_THOROUGH)
+        found = _Reading(model, shown, table.features).routines(table.channel)
+        for routine in sorted(found, key=lambda one: -one.rows):
+            offered.setdefault(routine.subtree, routine)
+    return tuple(offered.values())
+
+
+#: Where a stream begins.
+_START = Place(0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Border:
+    """Between two steps of a stream."""
+
+    stream: int
+    before: Place
+    after: Place
+
+
+@dataclass(slots=True)
+class _Events:
+    """Moments in which a routine might have gone on, and whether it did."""
+
+    moments: list[int] = field(default_factory=list)
+    went_on: list[bool] = field(default_factory=list)
+
+    def add(self, where: list[int], went_on: bool) -> None:
+        """As many events as moments."""
+        self.moments += where
+        self.went_on += [went_on] * len(where)
+
+
+class _Reading:
+    """What each row of the moments was, as a program has it."""
+
+    def __init__(self, model: Model, shown: Moments, features: tuple[Feature, ...]) -> None:
+        self._model = model
+        self._program = model.program
+        self._shown = shown
+        self._features = features
+        self._borders: dict[_Border, _Events] = {}
+        #: Events after all rounds of a routine.  Where fewer were seen, it may not have been the
+        #: last one, the more likely the earlier the moment began, which hangs on the state.
+        self._after_all: dict[_Border, _Events] = {}
+        self._begun: dict[tuple[int, Place], set[int]] = {}
+        self._rows: dict[tuple[int, int], int] = {}
+        self._ended: dict[tuple[int, int], int] = {}
+        of_word: list[list[int]] = [[] for _ in shown.words]
+        for moment, word in enumerate(shown.word.tolist()):
+            of_word[word].append(moment)
+        for word, where in zip(shown.words, of_word, strict=True):
+            cut = len(word) > LONGEST_WORD
+            self._note(model.explain(word[:LONGEST_WORD], cut), where, cut)
+
+    def _note(self, explained: list[int | None], where: list[int], cut: bool) -> None:
+        """Takes down what the rows of a word are, in all moments that have it."""
+        states = [self._model.states[one] for one in explained if one is not None]
+        rounds = 0
+        for before, after in zip([None, *states], [*states, None], strict=True):
+            if before is None or (after is not None and after.stream != before.stream):
+                rounds = 0
+                if after is not None:
+                    begun = (after.stream, self._place(after))
+                    self._begun.setdefault(begun, set()).update(where)
+            if before is None:
+                continue
+            place, goes_on = self._place(before), None
+            if after is not None and after.stream == before.stream:
+                goes_on = self._place(after)
+            routine = self._program[before.stream][place.routine]
+            key = (before.stream, place.routine)
+            self._rows[key] = self._rows.get(key, 0) + len(where)
+            if not before.completes(routine.steps[place.step]) or (cut and after is None):
+                continue
+            rounds += self._ends(place, before.stream)
+            if self._ends(place, before.stream):
+                self._ended[key] = self._ended.get(key, 0) + len(where)
+            for follower in self._followers(before.stream, place, rounds):
+                border = _Border(before.stream, place, follower)
+                self._borders.setdefault(border, _Events()).add(where, goes_on == follower)
+                if rounds >= routine.rounds:
+                    self._after_all.setdefault(border, _Events()).add(where, goes_on == follower)
+                if goes_on == follower:
+                    break
+
+    def _place(self, state: State) -> Place:
+        return self._model.order[state.stream][state.place]
+
+    def _ends(self, place: Place, stream: int) -> bool:
+        return place.step + 1 == len(self._program[stream][place.routine].steps)
+
+    def _followers(self, stream: int, place: Place, rounds: int) -> list[Place]:
+        """The steps that may follow a step, after some rounds of its routine in the same moment."""
+        routines = self._program[stream]
+        if not self._ends(place, stream):
+            return [Place(place.routine, place.step + 1)]
+        # Which round it was cannot be told, but that it was the last one if all were seen.
+        again = rounds < routines[place.routine].rounds
+        return [Place(place.routine, 0)] * again + [Place(place.routine + 1, 0)] * (
+            place.routine + 1 < len(routines)
+        )
+
+    def routines(self, channel: str) -> Iterator[FoundRoutine]:
+        """The routines that say more than that an action is done."""
+        for stream, routines in enumerate(self._program):
+            for number, routine in enumerate(routines):
+                children = self._children(stream, number, routine, channel)
+                if len(children) > 1:
+                    kind = nodes.Repeater if routine.rounds > 1 else _sequence
+                    key = (stream, number)
+                    yield FoundRoutine(
+                        kind(children), self._ended.get(key, 0), self._rows.get(key, 0)
+                    )
+
+    def _children(
+        self, stream: int, number: int, routine: Routine, channel: str
+    ) -> tuple[nodes.Node, ...]:
+        children: list[nodes.Node] = []
+        for place, step in enumerate(routine.steps):
+            for clause in self._guard(stream, number, place):
+                conditions = tuple(nodes.Condition(literal) for literal in clause)
+                children.append(
+                    conditions[0] if len(conditions) == 1 else nodes.Selector(conditions)
+                )
+            actions = tuple(nodes.Action(self._shown.actions[one], channel) for one in step)
+            children.append(actions[0] if len(actions) == 1 else nodes.ParallelSelector(actions))
+        return tuple(children)
+
+    def _guard(self, stream: int, number: int, place: int) -> Guard:
+        """What must hold before a step."""
+        here = Place(number, place)
+        if place:
+            border = _Border(stream, Place(number, place - 1), here)
+            return self._told_by(self._borders.get(border, _Events()), here=here, stream=stream)
+        again = self._again(stream, number)
+        if again is not None:
+            return again
+        if not number:
+            return self._where_begun(stream, here)
+        last = Place(number - 1, len(self._program[stream][number - 1].steps) - 1)
+        border = _Border(stream, last, here)
+        sure = self._after_all.get(border, _Events())
+        if len(sure.moments) >= _FEWEST_ROUNDS:
+            return self._told_by(sure, here=here, stream=stream)
+        # Where the routine before would go on from the beginning, it also ends by failing.
+        where = self._again(stream, number - 1)
+        return self._told_by(self._borders.get(border, _Events()), where, here, stream)
+
+    def _again(self, stream: int, number: int) -> Guard | None:
+        """What must hold before another round, None if there is none or it was rarely seen."""
+        routine = self._program[stream][number]
+        border = _Border(stream, Place(number, len(routine.steps) - 1), Place(number, 0))
+        if len(self._borders.get(border, _Events()).moments) < _FEWEST_ROUNDS:
+            return None
+        return self._told_by(self._borders[border], here=Place(number, 0), stream=stream)
+
+    def _told_by(
+        self, events: _Events, where: Guard | None = None, here: Place = _START, stream: int = 0
+    ) -> Guard:
+        """What decides on going on to a place of a stream.
+
+        Args:
+            events: When that might have happened.
+            where: What must hold for them to count.
+            here: The place.
+            stream: The stream.
+        """
+        if sum(events.went_on) < _FEWEST_PASSED:
+            return self._where_begun(stream, here)
+        states, went_on = self._shown.states[events.moments], np.array(events.went_on, dtype=bool)
+        if where:
+            counted = holds(where, states, self._features)
+            states, went_on = states[counted], went_on[counted]
+        return guard(states, went_on, self._features, _CONTRAST)
+
+    def _where_begun(self, stream: int, here: Place) -> Guard:
+        """What tells the moments in which a stream begins at a place from all others."""
+        begun = np.zeros(len(self._shown), dtype=bool)
+        begun[list(self._begun.get((stream, here), ()))] = True
+        return guard(self._shown.states, begun, self._features, _CONTRAST_AT_BEGINNING)
+
+
+def _sequence(children: tuple[nodes.Node, ...]) -> nodes.Sequence:
+    return nodes.Sequence(children, memory=True)

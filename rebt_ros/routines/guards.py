@@ -1,0 +1,176 @@
+"""Guards: the conditions under which a routine goes on with its next step.
+
+Whether it went on in a state is one bit, whose probability is high where the guard holds and low
+elsewhere.  The guard is searched for among conjunctions of clauses, each a literal or an OR of two,
+by the gain in likelihood that each clause brings, less what it costs to say which one it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TypeAlias
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, FloatArray
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, Literal, Threshold
+
+Clause: TypeAlias = tuple[Literal, ...]
+Guard: TypeAlias = tuple[Clause, ...]
+
+#: States that are looked at, thresholds that are tried, and clauses of a guard at most.
+_MOST_STATES = 6000
+_THRESHOLDS = 37
+_MOST_CLAUSES = 6
+#: Categories of a feature, and features, of which clauses of two literals are made.
+_MOST_CATEGORIES = 20
+_MOST_PAIRED = 40
+#: Fewer events than this prove nothing.
+_FEWEST = 15
+#: Nats that a clause must gain beyond its price.
+_GAIN = 5.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Clauses:
+    """Everything that a guard may be made of."""
+
+    clauses: tuple[Clause, ...]
+    holds: FloatArray
+    """Where each one holds, 0 or 1, shape (states, clauses)."""
+
+
+def guard(
+    states: FloatArray, went_on: BoolArray, features: Sequence[Feature], contrast: float
+) -> Guard:
+    """The conditions that decide whether something happens.
+
+    Args:
+        states: Shape (events, features).
+        went_on: Whether it happened, shape (events,).
+        features: The columns of `states`.
+        contrast: Where a clause does not hold, it must happen at most this often, as a share of
+            how often it happens where it does.
+
+    Returns:
+        Clauses that all have to hold; empty where nothing is decided by the state.
+    """
+    if len(states) > _MOST_STATES:
+        taken = np.linspace(0, len(states) - 1, _MOST_STATES).astype(np.int64)
+        states, went_on = states[taken], went_on[taken]
+    events, happened = len(went_on), float(went_on.sum())
+    if min(happened, events - happened) < _FEWEST:
+        return ()
+    candidates = _clauses(states, went_on, features)
+    if not candidates.clauses:
+        return ()
+    literals = len({literal for clause in candidates.clauses for literal in clause})
+    size = np.array([len(clause) for clause in candidates.clauses])
+    price = 1.5 * size * (np.log(literals) + 0.5 * np.log(events))
+    inside = np.ones(events)
+    known = float(_log_likelihood(np.array(happened), np.array(float(events))))
+    chosen: list[Clause] = []
+    while len(chosen) < _MOST_CLAUSES:
+        within = inside @ candidates.holds
+        hits = (inside * went_on) @ candidates.holds
+        likelihood = _log_likelihood(hits, within) + _log_likelihood(
+            happened - hits, events - within
+        )
+        dropped, dropped_hits = inside.sum() - within, (inside * went_on).sum() - hits
+        rate, outside = _share(hits, within), _share(dropped_hits, dropped)
+        gain = likelihood - price - known
+        gain[(within < _FEWEST) | (dropped < _FEWEST) | (outside > contrast * rate)] = -np.inf
+        best = int(gain.argmax())
+        if not gain[best] > _GAIN:
+            break
+        chosen.append(candidates.clauses[best])
+        inside = inside * candidates.holds[:, best]
+        known = float(likelihood[best])
+    return tuple(chosen)
+
+
+def holds(guard: Guard, states: FloatArray, features: Sequence[Feature]) -> BoolArray:
+    """In which states a guard holds.
+
+    Args:
+        guard: Conditions on the features.
+        states: Shape (states, features).
+        features: The columns of `states`.
+
+    Returns:
+        Shape (states,).
+    """
+    column = {feature.name: number for number, feature in enumerate(features)}
+    result = np.ones(len(states), dtype=bool)
+    for clause in guard:
+        fulfilled = np.zeros(len(states), dtype=bool)
+        for literal in clause:
+            match literal.condition:
+                case Threshold(name, value):
+                    true = states[:, column[name]] <= value
+                case IsTrue(name):
+                    true = states[:, column[name]] == 1
+                case HasCategory(name, category):
+                    place = features[column[name]].categories.index(category)
+                    true = states[:, column[name]] == place
+                case other:
+                    raise ValueError(f"a guard has no condition such as {other}")
+            fulfilled |= true == literal.positive
+        result &= fulfilled
+    return result
+
+
+def _share(some: FloatArray, of: FloatArray) -> FloatArray:
+    return some / np.maximum(of, 1.0)
+
+
+def _log_likelihood(hits: FloatArray, of: FloatArray) -> FloatArray:
+    """Log likelihood of as many hits where each has the same probability."""
+    rate = np.clip(hits / np.maximum(of, 1e-9), 1e-4, 1 - 1e-4)
+    likelihood: FloatArray = hits * np.log(rate) + (of - hits) * np.log(1 - rate)
+    return likelihood
+
+
+def _clauses(states: FloatArray, went_on: BoolArray, features: Sequence[Feature]) -> _Clauses:
+    literals: list[tuple[int, Literal, BoolArray]] = []
+    for column, feature in enumerate(features):
+        for condition, holds in _conditions(feature, states[:, column], went_on):
+            literals.append((column, Literal(condition), holds))
+            literals.append((column, Literal(condition, positive=False), ~holds))
+    clauses: list[Clause] = [(literal,) for _, literal, _ in literals]
+    columns = [holds for _, _, holds in literals]
+    if len(literals) <= 2 * _MOST_PAIRED:
+        for (one, first, here), (other, second, there) in combinations(literals, 2):
+            if one != other:
+                clauses.append((first, second))
+                columns.append(here | there)
+    return _Clauses(tuple(clauses), np.array(columns, dtype=float).T)
+
+
+def _conditions(
+    feature: Feature, values: FloatArray, went_on: BoolArray
+) -> list[tuple[Condition, BoolArray]]:
+    """Conditions on one feature; of the thresholds, the one that tells most."""
+    match feature.kind:
+        case FeatureKind.BINARY:
+            return [(IsTrue(feature.name), values == 1)]
+        case FeatureKind.CATEGORICAL:
+            return [
+                (HasCategory(feature.name, name), values == position)
+                for position, name in enumerate(feature.categories[:_MOST_CATEGORIES])
+            ]
+        case FeatureKind.NUMERIC:
+            known = values[~np.isnan(values)]
+            if not len(known):
+                return []
+            tried = np.unique(np.quantile(known, np.linspace(0.05, 0.95, _THRESHOLDS)))
+            below = (values[:, None] <= tried).astype(float)
+            hits, of = went_on @ below, below.sum(axis=0)
+            told = _log_likelihood(hits, of) + _log_likelihood(
+                went_on.sum() - hits, len(values) - of
+            )
+            threshold = float(tried[told.argmax()])
+            return [(Threshold(feature.name, threshold), values <= threshold)]

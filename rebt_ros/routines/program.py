@@ -1,0 +1,87 @@
+"""Programs: what a robot may be doing, without the conditions of its steps.
+
+step
+    An action, or several that are done together (PSA), in the order in which they are tried.
+routine
+    Steps one after the other, gone through once or several times.
+stream
+    Routines one after the other.
+program
+    Streams side by side; in each moment every stream goes on for a while, one after the other.
+
+All are tuples of positions of actions, because a search looks at thousands of them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+Step: TypeAlias = tuple[int, ...]
+
+
+class Routine(NamedTuple):
+    """Steps that are gone through one after the other."""
+
+    rounds: int
+    """How often; a Repeater where more than once."""
+    steps: tuple[Step, ...]
+
+
+Stream: TypeAlias = tuple[Routine, ...]
+Program: TypeAlias = tuple[Stream, ...]
+
+
+class Place(NamedTuple):
+    """Where a step stands in a stream whose rounds are written out."""
+
+    routine: int
+    step: int
+
+
+def places(stream: Stream) -> tuple[Place, ...]:
+    """The steps of a stream in the order in which they are done, all rounds."""
+    return tuple(
+        Place(number, step)
+        for number, routine in enumerate(stream)
+        for _ in range(routine.rounds)
+        for step in range(len(routine.steps))
+    )
+
+
+def tidy(program: Program) -> Program:
+    """The same program without empty parts, neighbouring routines of one round joined."""
+    streams = []
+    for stream in program:
+        routines: list[Routine] = []
+        for rounds, steps in stream:
+            steps = tuple(step for step in steps if step)
+            if not steps:
+                continue
+            if routines and rounds == 1 and routines[-1].rounds == 1:
+                routines[-1] = Routine(1, routines[-1].steps + steps)
+            else:
+                routines.append(Routine(rounds, steps))
+        if routines:
+            streams.append(tuple(routines))
+    return tuple(streams)
+
+
+def complexity(program: Program) -> int:
+    """How much has to be said to write a program down."""
+    return sum(
+        3
+        + sum(
+            2 + 3 * (rounds > 1) + sum(2 + 2 * len(step) for step in steps)
+            for rounds, steps in stream
+        )
+        for stream in program
+    )
+
+
+def states_needed(program: Program) -> int:
+    """How many states a model of the program has; see `likelihood`."""
+    return sum(
+        rounds * sum(len(step) * 2 ** (len(step) - 1) for step in steps)
+        for stream in program
+        for rounds, steps in stream
+    )

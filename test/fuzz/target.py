@@ -1,0 +1,125 @@
+"""What is fuzzed: readers of the package, and how an input for each is made."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import Any, Final
+from xml.etree import ElementTree
+
+from fuzz import corpus
+from fuzz.mutation import mutated_bytes, mutated_json, mutated_text
+from rebt_ros.behavior_tree.document import dumps, loads
+from rebt_ros.behavior_tree.dot import render_dot
+from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
+from rebt_ros.behavior_tree.svg import render_svg
+from rebt_ros.behavior_tree.text import render_text
+from rebt_ros.simulation.experiment_config import as_behavior_tree, parse_config
+from rebt_ros.storage.bag import METADATA
+from rebt_ros.storage.inputs import InputOptions, load
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A reader that must take or refuse, with one sentence, whatever it is given."""
+
+    name: str
+    make: Callable[[Random], Any]
+    """Makes an input."""
+    read: Callable[[Any], object]
+    """Reads it; may raise nothing but a `RebtError`."""
+
+
+def target(name: str, directory: Path) -> Target:
+    """The target of that name.
+
+    Args:
+        name: One of `NAMES`.
+        directory: An empty one, for the files of the inputs.
+    """
+    return _MAKERS[name](directory)
+
+
+def _document(random: Random) -> str:
+    text = random.choice(corpus.documents())
+    if random.random() < 0.3:
+        return mutated_text(random, text, [other.encode() for other in corpus.documents()])
+    return mutated_json(random, text)
+
+
+def _read_document(text: str) -> None:
+    """Reads a document; one that is taken must bear everything that is done with documents."""
+    learned = loads(text)
+    again = dumps(learned)
+    assert loads(again) == learned
+    again.encode()
+    runtime = TreeRuntime(learned, tree=executable(learned.tree))
+    for value in (0.0, 1.0):
+        runtime.tick([value] * len(learned.features))
+    runtime.halt()
+    assert all(line.isprintable() for line in render_text(learned).split("\n"))
+    render_dot(learned).encode()
+    picture = ElementTree.fromstring(render_svg(learned))
+    assert not [one.tag for one in picture.iter() if one.tag.endswith(("script", "foreignObject"))]
+
+
+def _experiment(random: Random) -> str:
+    text = random.choice(corpus.experiments())
+    return mutated_text(random, text) if random.random() < 0.3 else mutated_json(random, text)
+
+
+def _read_experiment(text: str) -> None:
+    as_behavior_tree(parse_config(text, "input").root)
+
+
+def _of_files(name: str, directory: Path, seeds: tuple[bytes, ...], file: str) -> Target:
+    """A target whose inputs are single files."""
+    path = directory / name / file
+
+    def make(random: Random) -> Path:
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(mutated_bytes(random, random.choice(seeds), seeds))
+        return path
+
+    return Target(name, make, lambda one: load([one]))
+
+
+def _bags(directory: Path) -> Target:
+    """A target whose inputs are bags: a directory, at times a single file of messages."""
+    seeds = corpus.bags(directory / "seeds")
+    files = {seed: {one.name: one.read_bytes() for one in seed.iterdir()} for seed in seeds}
+    path = directory / "bags"
+
+    def make(random: Random) -> Path:
+        seed = random.choice(seeds)
+        content = dict(files[seed])
+        others = [data for name, data in content.items() if name != METADATA]
+        changed = random.choice((METADATA, *content))
+        content[changed] = mutated_bytes(random, content[changed], others)
+        shutil.rmtree(path, ignore_errors=True)
+        path.mkdir()
+        for name, data in content.items():
+            (path / name).write_bytes(data)
+        (storage,) = content.keys() - {METADATA}
+        alone = changed == storage and random.random() < 0.3
+        return path / storage if alone and not storage.endswith(".zstd") else path
+
+    def read(one: Path) -> None:
+        load([one], InputOptions(skip_bad=True, sample_rate=10.0))
+
+    return Target("bags", make, read)
+
+
+_MAKERS: Final[dict[str, Callable[[Path], Target]]] = {
+    "documents": lambda _: Target("documents", _document, _read_document),
+    "recordings": lambda directory: _of_files(
+        "recordings", directory, corpus.recordings(directory / "seeds"), "input.csv"
+    ),
+    "tables": lambda directory: _of_files("tables", directory, corpus.tables(), "input.csv"),
+    "experiments": lambda _: Target("experiments", _experiment, _read_experiment),
+    "bags": _bags,
+}
+NAMES: Final = tuple(_MAKERS)

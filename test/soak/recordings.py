@@ -1,0 +1,76 @@
+"""What the recorder has left: every row is judged by itself and beside its neighbours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.errors import RebtError
+from rebt_ros.storage.recording import read_recording
+from soak.ledger import Ledger
+from soak.robot import action_in, state_of, values_from
+
+
+def audit(directory: Path, ledger: Ledger, blocks: int) -> None:
+    """Reads all recordings and enters what they lack.
+
+    Args:
+        directory: Of the recordings.
+        ledger: Knows how many rows each must have at least.
+        blocks: How many blocks the robot went through.
+    """
+    block_of = {state_of(block)[0]: block for block in range(blocks)}
+    seen: set[int] = set()
+    rows = 0
+    files = {one.resolve() for one in directory.iterdir() if one.suffix in (".csv", ".rec")}
+    for path in sorted(files | ledger.acknowledged.keys()):
+        wanted = ledger.acknowledged.get(path, 0)
+        try:
+            demonstration = read_recording(path).demonstration
+        except RebtError as err:
+            # One whose recorder was killed before its first row may have no head.
+            if wanted:
+                ledger.lose("acknowledged rows", f"{wanted} in {path.name}: {err}", wanted)
+            continue
+        rows += len(demonstration)
+        if len(demonstration) < wanted:
+            missing = wanted - len(demonstration)
+            ledger.lose("acknowledged rows", f"{missing} of {wanted} in {path.name}", missing)
+        _audit_rows(demonstration, ledger, block_of, seen, path in ledger.late)
+    ledger.figures["rows"] = rows
+    ledger.figures["demonstrations"] = len(files)
+
+
+def _audit_rows(
+    demonstration: Demonstration,
+    ledger: Ledger,
+    block_of: dict[float, int],
+    seen: set[int],
+    late: bool,
+) -> None:
+    before: int | None = None
+    for row, (state, code) in enumerate(
+        zip(demonstration.states.tolist(), demonstration.chosen.tolist(), strict=True)
+    ):
+        where = f"row {row} of {demonstration.name}"
+        block = block_of.get(state[0])
+        if block is None or tuple(state) != values_from(state[0]):
+            ledger.lose("mixed rows", f"{where} has values of several states")
+            continue
+        mistaken = demonstration.actions[code] != action_in(state)
+        if late and (block == before or mistaken):
+            # Said by the recorder, which takes an action with the state of its arrival.
+            ledger.figures["late_rows"] = ledger.figures.get("late_rows", 0) + 1
+            before = block
+            continue
+        if block == before:
+            ledger.lose("late states", f"{where} has the state of the row before")
+            continue
+        if mistaken:
+            ledger.lose("mixed rows", f"{where} has the action of another state")
+        if block in seen:
+            ledger.lose("doubled rows", where)
+        seen.add(block)
+        if before is not None and block != before + 1:
+            ledger.lose("missing rows", f"{where} follows on block {before}, not {block - 1}")
+        before = block
