@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench-reduction bench-recorder experiment fuzz soak lint format clean
+.PHONY: help setup build demo test bench bench-reduction bench-recorder experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -46,6 +46,10 @@ test: build ## Run the tests on the built package.
 	$(COLCON) test-result --test-result-base build/rebt_ros --verbose || status=$$?; \
 	$(VENV_PYTHON) .ci/count_tests.py build/rebt_ros/pytest.xml || status=$$?; \
 	exit $$status
+
+bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+bench: setup ## Measure us and the limit in turn, for docs/performance.md (ARGS="--only tick" for options).
+	@PYTHONPATH=.:test:$$PYTHONPATH $(VENV_PYTHON) test/benchmarks/bench.py $(ARGS)
 
 bench-reduction: setup ## Compare the sizes of BT-Espresso's trees and ours (ARGS="..." for options).
 	@$(VENV_PYTHON) -m rebt_ros.commands.bench_reduction ../shared/experiments $(ARGS)

@@ -8,10 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
+import numpy as np
+
+from rebt_ros import evaluation
 from rebt_ros.algorithms.priority_root import reduced_tree
 from rebt_ros.algorithms.re_bt_espresso import re_bt_espresso
 from rebt_ros.algorithms.rules import delta_close, leaf_rules
+from rebt_ros.arrays import IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -96,6 +101,28 @@ def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.
     return reduced_tree(rules, options.reductions, options.root)
 
 
+def own_history_choices(
+    trained: TrainedTree, table: DemonstrationTable, options: LearnOptions, *, psa: bool
+) -> IntArray:
+    """What the behavior tree of a decision tree chooses, LAT being what it chose before.
+
+    Without LAT there is no need for the behavior tree, whose minimization takes long: it chooses
+    what the leaf of the decision tree does, or the best supported one of the leaf's PSA group.
+    """
+    if trained.uses_last_action:
+        return evaluation.own_history_choices(convert(trained, options, psa=psa), table)
+    if not psa:
+        return trained.predict(table)
+    rules = leaf_rules(trained.tree, lambda leaf: delta_close(leaf, options.delta))
+    place = {action: position for position, action in enumerate(trained.tree.actions)}
+    first = {
+        frozenset(place[one] for one in rule.actions): place[rule.actions[0]] for rule in rules
+    }
+    leaves, of_row = trained.deciding(table)
+    chosen = [first[frozenset(delta_close(leaf, options.delta))] for leaf in leaves]
+    return np.array(chosen, dtype=np.int64)[of_row]
+
+
 def _unjudged(table: DemonstrationTable, options: LearnOptions) -> Policy:
     """Without cross-validation: no pruning, LAT and PSA only where they are asked for."""
     fitted = fit(
@@ -124,7 +151,7 @@ def _last_action_and_level(
         )
 
     def run(judged: CrossValidation) -> JudgedLevels:
-        return judged.own_history(lambda trained: convert(trained, options, psa=False))
+        return judged.own_history(partial(own_history_choices, options=options, psa=False))
 
     if options.last_action is Use.ALWAYS:
         with_lat = cross_validation(last_action=True)
@@ -158,7 +185,9 @@ def _choose_psa(
         return False, f"No leaf has several actions within delta = {options.delta:g}."
 
     def agreement(psa: bool) -> float:
-        return judged.own_history_at(ccp_alpha, lambda trained: convert(trained, options, psa=psa))
+        return judged.own_history_at(
+            ccp_alpha, partial(own_history_choices, options=options, psa=psa)
+        )
 
     with_psa, without = agreement(psa=True), agreement(psa=False)
     compared = f"agreement ({with_psa:.1%} with them, {without:.1%} without)"

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from rebt_ros import evaluation
 from rebt_ros.arrays import FloatArray, IntArray
-from rebt_ros.behavior_tree import nodes
-from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit_all
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.table import DemonstrationTable
 
@@ -24,8 +23,9 @@ MOST_FOLDS = 5
 #: are, and no larger trees than that, which nobody could read anyway.
 _MOST_LEVELS_RUN, _MOST_LEAVES_RUN = 12, 32
 
-#: Makes a behavior tree of a pruned decision tree.
-Convert = Callable[[TrainedTree], nodes.Node]
+#: What the behavior tree of a pruned decision tree chooses in the rows of a table after its own
+#: choices in the rows before: positions in the table's actions.
+Choices = Callable[[TrainedTree, DemonstrationTable], IntArray]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,23 +91,23 @@ class CrossValidation:
         upsample: Upsampling = Upsampling.NONE,
         step: Callable[[], None] = lambda: None,
     ) -> None:
-        def fitted(rows: DemonstrationTable) -> FittedTree:
-            tree = fit(
-                rows,
-                last_action=last_action,
-                max_depth=max_depth,
-                random_state=random_state,
-                upsample=upsample,
-            )
-            step()
-            return tree
-
         self._step = step
         fold = folds(table)
-        self.fitted = fitted(table)
+        numbers = np.unique(fold)
+        trees: list[FittedTree] = []
+        for tree in fit_all(
+            [lambda: table, *(partial(_outside, table, fold, number) for number in numbers)],
+            last_action=last_action,
+            max_depth=max_depth,
+            random_state=random_state,
+            upsample=upsample,
+        ):
+            trees.append(tree)
+            step()
+        self.fitted, *of_folds = trees
         self._folds = [
-            (fitted(table.where(fold != number)), table.where(fold == number))
-            for number in np.unique(fold)
+            (tree, table.where(fold == number))
+            for tree, number in zip(of_folds, numbers, strict=True)
         ]
         self._middles = _middles(self.fitted.path.alphas)
 
@@ -116,7 +116,7 @@ class CrossValidation:
         scores = [of_fold.agreements(rows, self._middles) for of_fold, rows in self._folds]
         return JudgedLevels(self.fitted.path.alphas, np.array(scores))
 
-    def own_history(self, convert: Convert) -> JudgedLevels:
+    def own_history(self, choices: Choices) -> JudgedLevels:
         """Levels with their own-history agreement: all, or an even selection if LAT is tested."""
         if not self.fitted.uses_last_action:
             # Without LAT a tree's own history makes no difference.
@@ -125,23 +125,34 @@ class CrossValidation:
         even = np.linspace(0, len(small) - 1, min(len(small), _MOST_LEVELS_RUN)).astype(int)
         run = small[np.unique(even)]
         scores = [
-            self._run(place, self._middles[run], convert) for place in range(len(self._folds))
+            self._run(place, self._middles[run], choices) for place in range(len(self._folds))
         ]
         return JudgedLevels(self.fitted.path.alphas[run], np.array(scores))
 
-    def own_history_at(self, ccp_alpha: float, convert: Convert) -> float:
+    def own_history_at(self, ccp_alpha: float, choices: Choices) -> float:
         """Mean own-history agreement of the folds' trees at one level."""
         level = np.array([ccp_alpha])
         return float(
-            np.mean([self._run(place, level, convert) for place in range(len(self._folds))])
+            np.mean([self._run(place, level, choices) for place in range(len(self._folds))])
         )
 
-    def _run(self, fold: int, ccp_alphas: FloatArray, convert: Convert) -> list[float]:
+    def _run(self, fold: int, ccp_alphas: FloatArray, choices: Choices) -> list[float]:
         """Own-history agreement of a fold's trees at some levels."""
         fitted, rows = self._folds[fold]
-        scores = [_agreement_run(convert(fitted.at(one)), rows) for one in ccp_alphas.tolist()]
+        scores: dict[bytes, float] = {}
+        found: list[float] = []
+        for ccp_alpha in ccp_alphas.tolist():
+            # The levels are those of another tree, several of which can be one level of this one.
+            level = fitted.path.leaves_at(ccp_alpha).tobytes()
+            if level not in scores:
+                scores[level] = float(np.mean(choices(fitted.at(ccp_alpha), rows) == rows.chosen))
+            found.append(scores[level])
         self._step()
-        return scores
+        return found
+
+
+def _outside(table: DemonstrationTable, fold: IntArray, number: int) -> DemonstrationTable:
+    return table.where(fold != number)
 
 
 def folds(table: DemonstrationTable) -> IntArray:
@@ -154,10 +165,6 @@ def folds(table: DemonstrationTable) -> IntArray:
     if len(shown) == 1:
         return np.arange(len(table)) * MOST_FOLDS // max(len(table), 1)
     return position * min(MOST_FOLDS, len(shown)) // len(shown)
-
-
-def _agreement_run(tree: nodes.Node, rows: DemonstrationTable) -> float:
-    return float(np.mean(evaluation.own_history_choices(tree, rows) == rows.chosen))
 
 
 def _middles(alphas: FloatArray) -> FloatArray:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -14,7 +16,7 @@ from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.fields import fields_of
 from rebt_ros.errors import InputError, OptionError
-from rebt_ros.storage.bag import read_bag
+from rebt_ros.storage.bag import STATE_TYPE, _States, _UndecodableError, read_bag
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 STATE = "std_msgs/msg/Float64MultiArray"
@@ -309,3 +311,41 @@ def test_what_is_no_bag_is_refused(tmp_path):
 )
 def test_field_names_come_from_labels_that_name_every_value(labels, count, fields):
     assert fields_of(labels, count) == fields
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.lists(st.text("ab,", max_size=3), max_size=2),
+            st.lists(st.floats(), max_size=3),
+            st.booleans(),
+        ),
+        max_size=8,
+    )
+)
+def test_states_are_read_as_rosbags_decodes_them(
+    messages: list[tuple[list[str], list[float], bool]],
+) -> None:
+    types, states = get_typestore(Stores.ROS2_JAZZY), _States()
+    for labels, numbers, little_endian in messages:
+        dimensions = [
+            types.types["std_msgs/msg/MultiArrayDimension"](label=label, size=1, stride=1)
+            for label in labels
+        ]
+        layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=dimensions, data_offset=0)
+        message = types.types[STATE_TYPE](layout=layout, data=np.array(numbers))
+        data = bytes(types.serialize_cdr(message, STATE_TYPE, little_endian=little_endian))
+        decoded = types.deserialize_cdr(data, STATE_TYPE)
+        values, names = states.read(data)
+        np.testing.assert_array_equal(np.array(values), decoded.data)
+        assert names == fields_of(labels, len(numbers))
+
+
+def test_a_state_cut_short_is_not_read_as_one_that_was_read_before() -> None:
+    types, states = get_typestore(Stores.ROS2_JAZZY), _States()
+    layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+    message = types.types[STATE_TYPE](layout=layout, data=np.array([1.0, 2.0]))
+    data = bytes(types.serialize_cdr(message, STATE_TYPE))
+    assert states.read(data) == states.read(data) == ((1.0, 2.0), ())
+    with pytest.raises(_UndecodableError):
+        states.read(data[:-8])

@@ -6,9 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import strategies as some
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from rebt_ros import evaluation
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.choosing import choose, convert
+from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.choosing import choose, convert, own_history_choices
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.options import LearnOptions, Use
@@ -114,3 +120,33 @@ def test_psa_nodes_stand_in_the_tree_where_asked_for_and_not_where_they_do_not_h
     assert any(isinstance(one, nodes.ParallelSelector) for one in nodes.walk(tree))
     plain = convert(always.fitted.at(0.0), options, psa=False)
     assert not any(isinstance(one, nodes.ParallelSelector) for one in nodes.walk(plain))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    table=some.tables(max_rows=40),
+    other=some.tables(max_rows=20),
+    options=st.builds(
+        LearnOptions,
+        delta=st.sampled_from((0.0, 0.3, 0.6, 1.0)),
+        max_depth=st.sampled_from((1, 2, None)),
+        root=st.sampled_from((Root.SELECTOR, Root.PARALLEL)),
+    ),
+    paper=st.booleans(),
+    last_action=st.booleans(),
+    psa=st.booleans(),
+)
+def test_what_a_tree_is_judged_by_is_what_its_behavior_tree_chooses(
+    table: DemonstrationTable,
+    other: DemonstrationTable,
+    options: LearnOptions,
+    paper: bool,
+    last_action: bool,
+    psa: bool,
+) -> None:
+    options = replace(options, reductions=None) if paper else options
+    trained = fit(table, last_action=last_action, max_depth=options.max_depth).at(0.01)
+    tree = convert(trained, options, psa=psa)
+    for rows in (table, other):
+        chosen = own_history_choices(trained, rows, options, psa=psa)
+        assert chosen.tolist() == evaluation.own_history_choices(tree, rows).tolist()

@@ -8,7 +8,7 @@ import strategies as some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree import nodes, prediction
 from rebt_ros.behavior_tree.prediction import (
     States,
     choose,
@@ -65,6 +65,25 @@ def test_what_is_chosen_is_the_first_action_that_the_tree_names_of_those_taken(
     for code, actions in zip(chosen.tolist(), first_ticks(tree, drawn, earlier), strict=True):
         named = [one for one in nodes.actions(tree) if one in actions]
         assert code == (some.ACTIONS.index(named[0]) if named else NO_ACTION)
+
+
+@settings(max_examples=60)
+@given(some.trees(repeaters=False), rows, st.integers(1, 5), st.data())
+def test_many_rows_in_parts_are_like_all_at_once(
+    tree: nodes.Node, drawn: list[tuple[float, ...]], size: int, data: st.DataObject
+) -> None:
+    codes = st.integers(NO_ACTION, len(some.LABELS) - 1)
+    last = data.draw(st.lists(codes, min_size=len(drawn), max_size=len(drawn)))
+    column = last_action_column(some.LABELS, np.array(last, dtype=np.int64))
+    states = [States(some.FEATURES, values(drawn), column) for _ in range(4)]
+    whole, ticked = choose(tree, some.ACTIONS, states[0]), triggered(tree, states[1])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(prediction, "_ROWS_AT_A_TIME", size)
+        assert choose(tree, some.ACTIONS, states[2]).tolist() == whole.tolist()
+        in_parts = triggered(tree, states[3])
+    assert {one: where.tolist() for one, where in in_parts.items()} == {
+        one: where.tolist() for one, where in ticked.items()
+    }
 
 
 @settings(max_examples=80)

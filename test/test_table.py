@@ -352,3 +352,41 @@ def test_a_correction_begins_with_the_last_action_of_the_robot() -> None:
     # A part that begins inside of it does not.
     assert table.where(np.array([0, 0, 0, 1, 1, 1], dtype=bool)).last.tolist() == [1, 0, -1]
     assert table.where(np.array([1, 0, 0, 0, 1, 1], dtype=bool)).last.tolist() == [-1, -1, -1]
+
+
+letters = st.sampled_from("abd")
+drawn_rows = st.lists(
+    st.tuples(
+        st.lists(st.sampled_from((0.0, -0.0, 1.0, 2.0, math.nan)), min_size=2, max_size=2),
+        letters,
+        letters,
+    ),
+    min_size=1,
+    max_size=8,
+)
+
+
+@given(st.lists(drawn_rows, min_size=1, max_size=3))
+def test_tables_hold_what_was_shown_row_by_row(
+    drawn: list[list[tuple[list[float], str, str]]],
+) -> None:
+    demonstrations = []
+    for name, rows in enumerate(drawn):
+        states, actions, channels = zip(*rows, strict=True)
+        demonstrations.append(
+            shown(str(name), states, "".join(actions), channels="".join(channels))
+        )
+    everything = [(str(name), *row) for name, rows in enumerate(drawn) for row in rows]
+    tables = tabulate(demonstrations)
+    assert [one.channel for one in tables] == sorted({row[3] for row in everything})
+    for table in tables:
+        its = [row for row in everything if row[3] == table.channel]
+        assert table.actions == tuple(sorted({row[2] for row in its}))
+        assert [table.actions[code] for code in table.chosen] == [row[2] for row in its]
+        assert [table.demonstrations[code] for code in table.demonstration] == [
+            row[0] for row in its
+        ]
+        np.testing.assert_array_equal(table.states, [row[1] for row in its])
+        for place, feature in enumerate(table.features):
+            values = {row[1][place] for row in everything if not math.isnan(row[1][place])}
+            assert feature.kind is (BINARY if values == {0.0, 1.0} else NUMERIC)

@@ -5,7 +5,7 @@ Actions count as succeeding at once and memory as empty, so that the result is t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -40,6 +40,11 @@ def last_action_of(history: ActionHistory) -> LastActionTest:
     return lambda condition: history.before(*condition.deciding) == condition.action
 
 
+#: Rows that are evaluated at a time: few enough to stay in a processor's cache, condition after
+#: condition, and many enough for what Python does once per node not to matter.
+_ROWS_AT_A_TIME = 16_384
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class States:
     """Rows of states on which a tree is evaluated; remembers the conditions it has tested."""
@@ -48,17 +53,38 @@ class States:
     values: FloatArray
     """Shape (rows, features): numbers, 0 or 1, positions in a feature's categories, or NaN."""
     last_action: LastActionTest
-    _tested: dict[Condition, BoolArray] = field(default_factory=dict, init=False)
+    _tested: dict[Literal, BoolArray] = field(default_factory=dict, init=False)
 
     def __len__(self) -> int:
         return len(self.values)
 
     def satisfy(self, literal: Literal) -> BoolArray:
         """Where the literal holds, shape (rows,)."""
-        if literal.condition not in self._tested:
-            self._tested[literal.condition] = self._test(literal.condition)
-        holds = self._tested[literal.condition]
-        return holds if literal.positive else ~holds
+        found = self._tested.get(literal)
+        if found is None:
+            found = (
+                ~self.satisfy(~literal) if not literal.positive else self._test(literal.condition)
+            )
+            self._tested[literal] = found
+        return found
+
+    def parts(self) -> Iterator[tuple[slice, States]]:
+        """The rows in parts that are quick to evaluate, each with its place."""
+        if len(self) <= _ROWS_AT_A_TIME:
+            yield slice(0, len(self)), self
+            return
+        tested: dict[LastActionIs, BoolArray | bool] = {}
+
+        def last_action(condition: LastActionIs) -> BoolArray | bool:
+            if condition not in tested:
+                tested[condition] = self.last_action(condition)
+            return tested[condition]
+
+        for start in range(0, len(self), _ROWS_AT_A_TIME):
+            rows = slice(start, min(start + _ROWS_AT_A_TIME, len(self)))
+            # Column by column, as they are tested.
+            values = np.asfortranarray(self.values[rows])
+            yield rows, States(self.features, values, _in_part(last_action, rows))
 
     def _test(self, condition: Condition) -> BoolArray:
         if isinstance(condition, LastActionIs):
@@ -78,6 +104,14 @@ class States:
                 return np.equal(column, feature.categories.index(category))
 
 
+def _in_part(last_action: LastActionTest, rows: slice) -> LastActionTest:
+    def test(condition: LastActionIs) -> BoolArray | bool:
+        found = last_action(condition)
+        return found if isinstance(found, bool) else found[rows]
+
+    return test
+
+
 def triggered(tree: nodes.Node, states: States) -> dict[nodes.Action, BoolArray]:
     """In which states each action is ticked, in the order in which the tree names them.
 
@@ -89,7 +123,9 @@ def triggered(tree: nodes.Node, states: States) -> dict[nodes.Action, BoolArray]
         One array of shape (rows,) per action.
     """
     ticked = {action: np.zeros(len(states), dtype=bool) for action in nodes.actions(tree)}
-    _tick(tree, states, np.ones(len(states), dtype=bool), ticked)
+    for rows, part in states.parts():
+        in_part = {action: where[rows] for action, where in ticked.items()}
+        _tick(tree, part, np.ones(len(part), dtype=bool), in_part)
     return ticked
 
 
@@ -106,9 +142,14 @@ def choose(tree: nodes.Node, actions: tuple[nodes.Action, ...], states: States) 
         a Parallel takes several, it is the first that the tree names.
     """
     chosen = np.full(len(states), NO_ACTION, dtype=np.int64)
-    for action, ticked in triggered(tree, states).items():
-        if action in actions:
-            chosen[ticked & (chosen == NO_ACTION)] = actions.index(action)
+    named = nodes.actions(tree)
+    for rows, part in states.parts():
+        ticked = {action: np.zeros(len(part), dtype=bool) for action in named}
+        _tick(tree, part, np.ones(len(part), dtype=bool), ticked)
+        # The first that is named is written last.
+        for action in reversed(named):
+            if action in actions:
+                np.putmask(chosen[rows], ticked[action], actions.index(action))
     return chosen
 
 
@@ -123,19 +164,24 @@ def _tick(
         case nodes.Condition(literal=literal):
             return reached & states.satisfy(literal)
         case nodes.Action():
-            ticked[node] |= reached
+            where = ticked[node]
+            where |= reached
             return reached
         case nodes.Inverter(child=child):
             return reached & ~_tick(child, states, reached, ticked)
         case nodes.Sequence(children=children) | nodes.Repeater(children=children):
             for child in children:
                 reached = _tick(child, states, reached, ticked)
+                if not reached.any():
+                    break
             return reached
         case nodes.Selector(children=children) | nodes.ParallelSelector(children=children):
-            succeeded = np.zeros(len(states), dtype=bool)
+            left = reached
             for child in children:
-                succeeded |= _tick(child, states, reached & ~succeeded, ticked)
-            return succeeded
+                left = left & ~_tick(child, states, left, ticked)
+                if not left.any():
+                    break
+            return reached & ~left
         case nodes.Parallel(children=children):
             results = [_tick(child, states, reached, ticked) for child in children]
             for succeeded in results:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -26,7 +26,6 @@ from rebt_ros.logic.conditions import (
     Interval,
     IsTrue,
     LastActionIs,
-    Literal,
     Threshold,
 )
 
@@ -170,7 +169,8 @@ class TreeRuntime:
     ) -> py_trees.behaviour.Behaviour:
         match node:
             case nodes.Condition(literal=literal):
-                return _Test(name, self._test(literal, history))
+                holds = self._test_condition(literal.condition, history)
+                return _Test(name, holds, positive=literal.positive)
             case nodes.Action():
                 return _Command(name, node, self._commander, self._ticked)
             case nodes.Inverter():
@@ -186,10 +186,6 @@ class TreeRuntime:
             case nodes.Repeater():
                 sequence = py_trees.composites.Sequence(name, True, children)
                 return py_trees.decorators.Repeat(name=name, child=sequence, num_success=-1)
-
-    def _test(self, literal: Literal, history: ActionHistory) -> Callable[[], bool]:
-        holds = self._test_condition(literal.condition, history)
-        return holds if literal.positive else lambda: not holds()
 
     def _test_condition(self, condition: Condition, history: ActionHistory) -> Callable[[], bool]:
         if isinstance(condition, LastActionIs):
@@ -216,14 +212,24 @@ def _parallel(
 
 
 class _Test(py_trees.behaviour.Behaviour):
-    """A condition: succeeds or fails at once."""
+    """A condition, or its negation: succeeds or fails at once.
 
-    def __init__(self, name: str, holds: Callable[[], bool]) -> None:
+    Most of a tree's nodes are conditions.  They never run, have nothing to begin or to end, and so
+    leave out what py_trees does for behaviours that do; what is seen from outside is the same.
+    """
+
+    def __init__(self, name: str, holds: Callable[[], bool], *, positive: bool) -> None:
         super().__init__(name)
         self._holds = holds
+        both = (Status.SUCCESS, Status.FAILURE)
+        self._if_true, self._if_false = both if positive else reversed(both)
 
     def update(self) -> Status:
-        return Status.SUCCESS if self._holds() else Status.FAILURE
+        return self._if_true if self._holds() else self._if_false
+
+    def tick(self) -> Iterator[py_trees.behaviour.Behaviour]:
+        self.status = self.update()
+        yield self
 
 
 class _Command(py_trees.behaviour.Behaviour):

@@ -72,21 +72,27 @@ def encode(table: DemonstrationTable, last_action: bool) -> Float32Array:
     Where there is nothing to learn from, it has one column that tells nothing, as scikit-learn
     wants at least one.
     """
-    blocks: list[Float32Array] = []
-    for index, feature in enumerate(table.features):
+    widths = [
+        len(one.categories) if one.kind is FeatureKind.CATEGORICAL else 1 for one in table.features
+    ]
+    width = sum(widths) + (len(table.actions) if last_action else 0)
+    # Filled in place: large tables are held once.
+    matrix = np.zeros((len(table), max(width, 1)), dtype=np.float32)
+    end = 0
+    for index, (feature, its) in enumerate(zip(table.features, widths, strict=True)):
         values = table.states[:, index]
+        start, end = end, end + its
         if feature.kind is FeatureKind.NUMERIC:
-            known = np.where(np.isnan(values), MISSING, values)
-            blocks.append(known.astype(np.float32)[:, np.newaxis])
+            column = matrix[:, start]
+            column[:] = values
+            column[np.isnan(values)] = MISSING
         elif feature.kind is FeatureKind.BINARY:
-            blocks.append((values == 1).astype(np.float32)[:, np.newaxis])
+            matrix[:, start] = values == 1
         else:
-            blocks.append(_one_hot(values, len(feature.categories)))
+            _one_hot(values, matrix[:, start:end])
     if last_action:
-        blocks.append(_one_hot(table.last, len(table.actions)))
-    if not blocks:
-        return np.zeros((len(table), 1), dtype=np.float32)
-    return np.hstack(blocks)
+        _one_hot(table.last, matrix[:, end:])
+    return matrix
 
 
 def exact_threshold(threshold: float) -> float:
@@ -111,5 +117,6 @@ def exact_threshold(threshold: float) -> float:
     return middle if tie_goes_down else float(np.nextafter(middle, -np.inf))
 
 
-def _one_hot(codes: FloatArray | IntArray, count: int) -> Float32Array:
-    return np.equal(codes[:, np.newaxis], np.arange(count)).astype(np.float32)
+def _one_hot(codes: FloatArray | IntArray, block: Float32Array) -> None:
+    for code in range(block.shape[1]):
+        block[:, code] = codes == code

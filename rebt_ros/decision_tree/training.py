@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +19,9 @@ from rebt_ros.decision_tree.pruning import PruningPath, pruning_path
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.decision_tree.upsampling import Upsampled, Upsampling, svm_smote
 from rebt_ros.demonstration.table import DemonstrationTable
+
+#: Tables and trees that are in the making at the same time, whatever the number of cores.
+_MOST_AT_A_TIME = 4
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -36,6 +42,12 @@ class TrainedTree:
         """scikit-learn's own prediction: positions in ``table.actions``, shape (rows,)."""
         majority = np.argmax(self.classifier.tree_.value[:, 0, :], axis=1)
         return np.asarray(self.classifier.classes_[majority[self.leaves(table)]], dtype=np.int64)
+
+    def deciding(self, table: DemonstrationTable) -> tuple[tuple[Leaf, ...], IntArray]:
+        """The leaves that decide for the rows, and the position of each row's one among them."""
+        nodes, position = np.unique(self.leaves(table), return_inverse=True)
+        distributions = _distributions(self.classifier, len(self.tree.actions))[nodes]
+        return tuple(Leaf(tuple(one)) for one in distributions.tolist()), position
 
     def leaves(self, table: DemonstrationTable) -> IntArray:
         """The node of the classifier that decides for each row, shape (rows,)."""
@@ -113,20 +125,72 @@ def fit(
     Raises:
         OptionError: Upsampling needs a package that is not installed.
     """
+    options = _FitOptions(last_action, max_depth, random_state, upsample)
+    with _quiet():
+        return _fitted(table, options)
+
+
+def fit_all(
+    tables: Sequence[Callable[[], DemonstrationTable]],
+    *,
+    last_action: bool,
+    max_depth: int | None = None,
+    random_state: int = 0,
+    upsample: Upsampling = Upsampling.NONE,
+) -> Iterator[FittedTree]:
+    """Fits a decision tree to each table, on several processor cores; see `fit`.
+
+    Args:
+        tables: Each is made when its turn comes, so that few are held at a time.
+        last_action: As for `fit`, like all that follow.
+        max_depth: Splits on the longest path.
+        random_state: Of each fit.
+        upsample: Of each table.
+
+    Yields:
+        The trees in the order of the tables.
+    """
+    options = _FitOptions(last_action, max_depth, random_state, upsample)
+    # Threads are enough: scikit-learn lets go of Python's lock while it grows a tree.  The library
+    # that upsampling is done with is not known to stand threads.
+    alone = upsample is not Upsampling.NONE
+    workers = 1 if alone else min(_MOST_AT_A_TIME, os.cpu_count() or 1)
+    with _quiet(), ThreadPoolExecutor(workers) as pool:
+        yield from pool.map(lambda table: _fitted(table(), options), tables)
+
+
+@dataclass(frozen=True, slots=True)
+class _FitOptions:
+    last_action: bool
+    max_depth: int | None
+    random_state: int
+    upsample: Upsampling
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without a warning that takes actions, which are codes here, for a regression's numbers.
+
+    Warnings are switched for the whole process, so this stands around threads, not in them.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="The number of unique classes")
+        yield
+
+
+def _fitted(table: DemonstrationTable, options: _FitOptions) -> FittedTree:
+    last_action, random_state = options.last_action, options.random_state
     asked = columns(table, last_action)
     matrix, chosen = encode(table, last_action), table.chosen
     notes: tuple[str, ...] = ()
-    if upsample is Upsampling.SVM_SMOTE:
+    if options.upsample is Upsampling.SVM_SMOTE:
         more = svm_smote(matrix, chosen, asked, random_state)
         notes = tuple(_notes(table, more))
         matrix, chosen = more.matrix, more.chosen
     classifier = DecisionTreeClassifier(
-        criterion="gini", max_depth=max_depth, random_state=random_state
+        criterion="gini", max_depth=options.max_depth, random_state=random_state
     )
-    with warnings.catch_warnings():
-        # Actions are codes here; that there are many does not make this a regression.
-        warnings.filterwarnings("ignore", message="The number of unique classes")
-        classifier.fit(matrix, chosen)
+    classifier.fit(matrix, chosen)
     actions = tuple(Action(label, table.channel) for label in table.actions)
     path = pruning_path(classifier)
     return FittedTree(classifier, path, actions, asked, last_action, notes)
@@ -167,10 +231,7 @@ def _as_data(
     is_leaf: BoolArray,
 ) -> DecisionNode:
     fitted = classifier.tree_
-    # Shares of rows; scaled back to whole rows, which keeps ties exact.
-    rows = np.rint(fitted.value[:, 0, :] * fitted.n_node_samples[:, np.newaxis]).astype(np.int64)
-    distributions = np.zeros((fitted.node_count, len(actions)), dtype=np.int64)
-    distributions[:, classifier.classes_] = rows
+    distributions = _distributions(classifier, len(actions))
     data: dict[int, DecisionNode] = {}
     # scikit-learn numbers children after their parents.
     for node in range(fitted.node_count - 1, -1, -1):
@@ -182,3 +243,13 @@ def _as_data(
         holds, fails = (left, right) if literal.positive else (right, left)
         data[node] = Split(literal.condition, data[holds], data[fails])
     return data[0]
+
+
+def _distributions(classifier: DecisionTreeClassifier, actions: int) -> IntArray:
+    """Rows of each action in each node, shape (nodes, actions)."""
+    fitted = classifier.tree_
+    # Shares of rows; scaled back to whole rows, which keeps ties exact.
+    rows = np.rint(fitted.value[:, 0, :] * fitted.n_node_samples[:, np.newaxis]).astype(np.int64)
+    distributions = np.zeros((fitted.node_count, actions), dtype=np.int64)
+    distributions[:, classifier.classes_] = rows
+    return distributions

@@ -17,6 +17,9 @@ from rebt_ros.errors import InputError, OptionError
 #: Categories of truth values that are sometimes missing, in the order of 0 and 1.
 _TRUTH = ("False", "True")
 
+#: Rows that are looked at before all of them are.
+_FIRST_ROWS = 1000
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DemonstrationTable:
@@ -125,22 +128,53 @@ def _channel_table(
     features: tuple[Feature, ...],
     states: FloatArray,
 ) -> DemonstrationTable:
-    channel_of_row = np.concatenate([np.array(one.channels)[one.channel] for one in demonstrations])
-    rows = channel_of_row == channel
-    labels = np.concatenate([np.array(one.actions)[one.chosen] for one in demonstrations])[rows]
-    actions, chosen = np.unique(labels, return_inverse=True)
-    lengths = [len(one) for one in demonstrations]
+    rows = [_rows_of(channel, one) for one in demonstrations]
+    codes = [one.chosen[its] for one, its in zip(demonstrations, rows, strict=True)]
+    actions, chosen = _joined_labels([one.actions for one in demonstrations], codes)
+    everywhere = np.concatenate(rows)
     return DemonstrationTable(
         channel,
         features,
-        states[rows],
-        tuple(map(str, actions)),
-        chosen.astype(np.int64),
+        # The only copy is the one that was made when states were joined.
+        states if everywhere.all() else states[everywhere],
+        actions,
+        chosen,
         tuple(one.name for one in demonstrations),
-        np.repeat(np.arange(len(demonstrations)), lengths)[rows],
-        np.concatenate([one.stamps for one in demonstrations])[rows],
-        _before(channel, demonstrations, actions.tolist()),
+        np.repeat(np.arange(len(demonstrations)), [len(one) for one in codes]),
+        np.concatenate([one.stamps for one in demonstrations])[everywhere],
+        _before(channel, demonstrations, actions),
     )
+
+
+def _rows_of(channel: str, demonstration: Demonstration) -> BoolArray:
+    if channel not in demonstration.channels:
+        return np.zeros(len(demonstration), dtype=bool)
+    return np.equal(demonstration.channel, demonstration.channels.index(channel))
+
+
+def _joined_labels(
+    labels: Sequence[tuple[str, ...]], codes: Sequence[IntArray]
+) -> tuple[tuple[str, ...], IntArray]:
+    """Columns of strings as one; only the labels that occur, sorted.
+
+    >>> _joined_labels([("b", "c"), ("a", "b")], [np.array([0, 0]), np.array([1, 0])])
+    (('a', 'b'), array([1, 1, 1, 0]))
+    """
+    counts = [
+        np.bincount(its, minlength=len(known)) for known, its in zip(labels, codes, strict=True)
+    ]
+    occurring = {
+        label
+        for known, its in zip(labels, counts, strict=True)
+        for label, count in zip(known, its.tolist(), strict=True)
+        if count
+    }
+    place = {label: position for position, label in enumerate(sorted(occurring))}
+    joined = [
+        np.array([place.get(label, NO_ACTION) for label in known], dtype=np.int64)[its]
+        for known, its in zip(labels, codes, strict=True)
+    ]
+    return tuple(place), np.concatenate(joined)
 
 
 def _before(
@@ -165,21 +199,14 @@ def _joined_states(
                 f"({', '.join(differing[:3])}): learn from demonstrations of one robot and set-up."
             )
     features = tuple(map(_unified, *(one.features for one in demonstrations)))
-    return features, np.concatenate(
-        [
-            np.column_stack(
-                [
-                    _recoded(one.states[:, index], mine, unified)
-                    for index, (mine, unified) in enumerate(
-                        zip(one.features, features, strict=True)
-                    )
-                ]
-            )
-            if features
-            else one.states
-            for one in demonstrations
-        ]
-    )
+    states = np.concatenate([one.states for one in demonstrations])
+    end = 0
+    for one in demonstrations:
+        start, end = end, end + len(one)
+        for index, (feature, unified) in enumerate(zip(one.features, features, strict=True)):
+            if feature.categories != unified.categories:
+                states[start:end, index] = _recoded(one.states[:, index], feature, unified)
+    return features, states
 
 
 def _unified(first: Feature, *others: Feature) -> Feature:
@@ -213,6 +240,7 @@ def _recoded(column: FloatArray, mine: Feature, unified: Feature) -> FloatArray:
 def _with_kinds(
     features: tuple[Feature, ...], states: FloatArray, declared: Mapping[str, FeatureKind]
 ) -> tuple[tuple[Feature, ...], FloatArray]:
+    """The features with their kinds, and the same states, in which categories become positions."""
     unknown = sorted(set(declared) - {feature.name for feature in features})
     if unknown:
         raise OptionError(
@@ -220,11 +248,15 @@ def _with_kinds(
             f"the features are {', '.join(feature.name for feature in features)}."
         )
     typed: list[Feature] = []
-    states = states.copy()
     for index, feature in enumerate(features):
-        values = np.unique(states[:, index])
+        column = states[:, index]
+        if feature.kind is FeatureKind.NUMERIC and feature.name not in declared:
+            binary = _is_binary(column)
+            typed.append(replace(feature, kind=FeatureKind.BINARY) if binary else feature)
+            continue
+        values = np.unique(column)
         values = values[~np.isnan(values)]
-        kind = declared.get(feature.name, _detected(feature, values))
+        kind = declared.get(feature.name, feature.kind)
         _check_kind(feature, kind, values)
         if kind is feature.kind:
             typed.append(feature)
@@ -232,16 +264,21 @@ def _with_kinds(
             typed.append(
                 replace(feature, kind=kind, categories=tuple(category(value) for value in values))
             )
-            known = ~np.isnan(states[:, index])
-            states[known, index] = np.searchsorted(values, states[known, index])
+            known = ~np.isnan(column)
+            column[known] = np.searchsorted(values, column[known])
         else:
             typed.append(replace(feature, kind=kind))
     return tuple(typed), states
 
 
-def _detected(feature: Feature, values: FloatArray) -> FeatureKind:
-    binary = feature.kind is FeatureKind.NUMERIC and values.tolist() == [0.0, 1.0]
-    return FeatureKind.BINARY if binary else feature.kind
+def _is_binary(column: FloatArray) -> bool:
+    """Whether there is nothing but 0 and 1, and both of them, where it is not missing."""
+    # Almost always the first rows tell.
+    for rows in (column[:_FIRST_ROWS], column):
+        truth = (rows == 0) | (rows == 1)
+        if not (truth | np.isnan(rows)).all():
+            return False
+    return bool((column == 0).any() and (column == 1).any())
 
 
 def _check_kind(feature: Feature, kind: FeatureKind, values: FloatArray) -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from operator import itemgetter
 from pathlib import Path
+from struct import Struct
 from textwrap import shorten
 from typing import Protocol, cast
 
@@ -98,6 +99,7 @@ class _Feed:
     path: Path
     builder: DemonstrationBuilder
     skip_bad: bool
+    states: _States = field(default_factory=lambda: _States())
     seen: Counter[str] = field(default_factory=Counter)
     """Messages by topic."""
     early: int = 0
@@ -109,7 +111,7 @@ class _Feed:
         topic = connection.topic
         self.seen[topic] += 1
         try:
-            return _pushed(self.builder, connection, stamp, data)
+            return self._pushed(connection, stamp, data)
         except BadMessageError as err:
             if err.fault is Fault.NO_STATE:
                 self.early += 1
@@ -126,6 +128,19 @@ class _Feed:
             raise problem
         self.bad.append(str(problem))
         return ()
+
+    def _pushed(self, connection: Connection, stamp: int, data: bytes) -> tuple[Row, ...]:
+        """The rows that a message completes.
+
+        Raises:
+            BadMessageError: The builder refuses it.
+            _UndecodableError: It cannot be decoded.
+        """
+        if connection.msgtype == ACTION_TYPE:
+            message = cast(_String, _decoded(data, ACTION_TYPE))
+            return self.builder.act(stamp, connection.topic, message.data)
+        values, labels = self.states.read(data)
+        return self.builder.observe(stamp, connection.topic, values, labels)
 
     def notes(self) -> tuple[str, ...]:
         notes = []
@@ -178,25 +193,58 @@ class _String(Protocol):
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 
 
-def _pushed(
-    builder: DemonstrationBuilder, connection: Connection, stamp: int, data: bytes
-) -> tuple[Row, ...]:
-    """The rows that a message completes.
+def _decoded(data: bytes, kind: str) -> object:
+    """A message.
 
     Raises:
-        BadMessageError: The builder refuses it.
         _UndecodableError: It cannot be decoded.
     """
     try:
-        message = _TYPES.deserialize_cdr(data, connection.msgtype)
+        return _TYPES.deserialize_cdr(data, kind)
     except Exception as err:
         # The generated decoders let whatever goes wrong inside them through.
         raise _UndecodableError(str(err)) from err
-    if connection.msgtype == ACTION_TYPE:
-        return builder.act(stamp, connection.topic, cast(_String, message).data)
-    state = cast(_Float64MultiArray, message)
-    labels = fields_of([dimension.label for dimension in state.layout.dim], len(state.data))
-    return builder.observe(stamp, connection.topic, state.data.tolist(), labels)
+
+
+@dataclass(frozen=True, slots=True)
+class _Head:
+    """What state messages of one length begin with: all of them but their numbers."""
+
+    data: bytes
+    numbers: Struct
+    labels: tuple[str, ...]
+
+
+class _States:
+    """Reads state messages, which differ in their numbers alone as a rule.
+
+    A message of the same length and with the same bytes up to its first number has the same layout
+    and as many numbers, which are its last bytes.  So the layout is decoded once.
+    """
+
+    def __init__(self) -> None:
+        self._heads: dict[int, _Head] = {}
+
+    def read(self, data: bytes) -> tuple[tuple[float, ...], tuple[str, ...]]:
+        """The numbers of a message, and the names that it gives to them.
+
+        Raises:
+            _UndecodableError: It cannot be decoded.
+        """
+        head = self._heads.get(len(data))
+        if head is not None and data.startswith(head.data):
+            return head.numbers.unpack_from(data, len(head.data)), head.labels
+        message = cast(_Float64MultiArray, _decoded(data, STATE_TYPE))
+        labels = fields_of([dimension.label for dimension in message.layout.dim], len(message.data))
+        self._remember(data, message.data, labels)
+        return tuple(message.data.tolist()), labels
+
+    def _remember(self, data: bytes, values: FloatArray, labels: tuple[str, ...]) -> None:
+        numbers = Struct(f"<{len(values)}d")
+        head = data[: len(data) - numbers.size]
+        little_endian = data[1:2] == b"\x01"
+        if len(values) and little_endian and data[len(head) :] == values.tobytes():
+            self._heads[len(data)] = _Head(head, numbers, labels)
 
 
 @contextlib.contextmanager
@@ -217,9 +265,15 @@ def _messages(
     """The messages by the time at which they were recorded, those of one instant as they stand."""
     with _explained(path):
         messages = _unpacked_in_bounds(path, reader, wanted)
-        # A directory's files come one after the other, and where the recorder went from one to
-        # the next their times may overlap.
-        yield from sorted(messages, key=itemgetter(1)) if path.is_dir() else messages
+        # Files are read one after the other, each in the order of time, and where the recorder went
+        # from one to the next their times may overlap.
+        several = path.is_dir() and len(list(filter(_holds_messages, path.iterdir()))) > 1
+        yield from sorted(messages, key=itemgetter(1)) if several else messages
+
+
+def _holds_messages(path: Path) -> bool:
+    """Whether it is a file of a bag's messages, compressed or not."""
+    return any(suffix in STORAGE_SUFFIXES for suffix in path.suffixes)
 
 
 def _unpacked_in_bounds(
