@@ -12,7 +12,7 @@ pytest.importorskip("rclpy")
 
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
-from ros_processes import CHECKOUT, NodeProcess, Peer, own_domain
+from ros_processes import CHECKOUT, PATIENCE, NodeProcess, Peer, own_domain
 
 #: What every node has.
 _BUILT_IN = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
@@ -21,8 +21,15 @@ _BUILT_IN = re.compile(r"use_sim_time|start_type_description_service|qos_overrid
 def _ask(peer: Peer, kind: Any, service: str, request: Any) -> Any:
     client = peer.node.create_client(kind, service)
     peer.wait_until(client.service_is_ready, what=service)
-    future = client.call_async(request)
-    peer.wait_until(future.done, what=f"the answer of {service}")
+    # An answer is lost when the service has not yet heard of the one who asked, so ask again.
+    for patience in (5.0, 10.0, PATIENCE):
+        future = client.call_async(request)
+        try:
+            peer.wait_until(future.done, patience, what=f"the answer of {service}")
+            break
+        except TimeoutError:
+            if patience == PATIENCE:
+                raise
     return future.result()
 
 
