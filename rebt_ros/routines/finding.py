@@ -12,10 +12,11 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.routines.corpus import LONGEST_WORD, corpus
 from rebt_ros.routines.guards import Guard, guard, holds
-from rebt_ros.routines.likelihood import Model, State
+from rebt_ros.routines.likelihood import Model
 from rebt_ros.routines.moments import Moments, moments
 from rebt_ros.routines.program import Place, Routine
 from rebt_ros.routines.search import programs
+from rebt_ros.routines.streams import State
 
 #: Share of the rows that must follow another one in the same moment for routines to be looked for,
 #: and how many such rows there must be.
