@@ -258,15 +258,15 @@ class Models:
         idle += np.cumsum(expected.ended, axis=2)[:, :, :-1]
         for stream in range(self._streams):
             idle[:, :, stream] += passed_on[:, :, stream, stream + 1 :].sum(axis=2)
-        self._idle = np.where(self._used, idle / (idle + taken), 1)
+        self._idle = np.where(self._used, idle / (idle + taken), np.float32(1))
         going = (self._of_border @ expected.went_on[:, :, None])[:, :, 0]
         being = going + (self._of_border @ expected.stopped[:, :, None])[:, :, 0]
         self._goes_on[:, :-1] = np.minimum((going + 0.5) / (being + 1), 0.95)
         entered = expected.entered
         entered[:, 1:] += 0.5 * self._enters[:, 1:]
-        entered[:, 0] = np.where(self._first > 0, entered[:, 0] + 1e-9, 0)
-        together: Float32Array = entered @ self._to_stream @ self._of_stream
-        self._enters = np.divide(entered, np.maximum(together, _LEAST), dtype=np.float32)
+        entered[:, 0] = np.where(self._first > 0, entered[:, 0] + _LEAST, np.float32(0))
+        together = entered @ self._to_stream @ self._of_stream
+        self._enters = (entered / np.maximum(together, _LEAST)).astype(np.float32)
         self._assemble()
 
 
