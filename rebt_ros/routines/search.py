@@ -129,9 +129,7 @@ Routine(rounds=1, steps=((3,),)))
     return (Routine(1, tuple((action,) for action in word)),) if word else ()
 
 
-def _climb(
-    best: _Judged, corpus: Corpus, rounds: int, most: int, closer: int = _CLOSER
-) -> _Judged:
+def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int, closer: int = _CLOSER) -> _Judged:
     """Takes better neighbours until there is none, or enough have been looked at.
 
     Args:
