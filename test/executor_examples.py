@@ -66,13 +66,19 @@ def report(peer: Peer, *, robot: Any = None) -> dict[str, str]:
 
 
 class Robot:
-    """Publishes a state all the time and hears the commands."""
+    """Publishes a state all the time and hears the commands.
 
-    def __init__(self, peer: Peer) -> None:
+    Args:
+        peer: What publishes and listens.
+        executor: The name of the node that commands.
+        topic: Where it does.
+    """
+
+    def __init__(self, peer: Peer, executor: str = "executor", topic: str = "command") -> None:
         self._peer = peer
         self.state = (7.0, 0.0)
-        self.commands = peer.listen(String, "command")
-        peer.introduce("executor")
+        self.commands = peer.listen(String, topic)
+        peer.introduce(executor)
 
     def until(self, condition: Any, what: str = "") -> Any:
         def published() -> Any:
@@ -202,6 +208,11 @@ class SimulatedTime:
         for _ in range(ticks):
             self._peer.state(*self.STATE)
             self.step()
+
+    def jump(self, seconds: float) -> None:
+        """Sets the time, either way, where no state is under way any longer."""
+        self.report()
+        self.set(self.now + round(seconds * 1e9))
 
     def tick(self) -> Any:
         """Goes on to the next tick, and returns its command."""

@@ -6,7 +6,6 @@ Each test fails when the protection that it names is taken away.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -35,8 +34,7 @@ from executor_examples import (
     where_x_is_small,
 )
 from ros_processes import AGES, LATCHED, NodeProcess, Peer, values_of
-from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Bool, Float64MultiArray, String
+from std_msgs.msg import Bool, Float64MultiArray
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps
@@ -301,10 +299,8 @@ def test_nobody_takes_over_where_that_is_turned_off_or_the_commands_are_remapped
     arguments = ["-r", "command:=hand"]
     with NodeProcess("executor_node", domain, tmp_path, parameters, arguments):
         publish(peer, READS_X)
-        own = peer.listen(String, "hand")
-        robot = Robot.__new__(Robot)
-        robot._peer, robot.state, robot.commands = peer, (7.0, 0.0), own
-        robot.until(lambda: len(own) > 50, "commands that are no takeover")
+        robot = Robot(peer, topic="hand")
+        robot.until(lambda: len(robot.commands) > 50, "commands that are no takeover")
         assert report(peer, robot=robot)["takeovers"] == "0"
 
 
@@ -351,14 +347,9 @@ def test_the_clock_may_jump_either_way(domain: int, peer: Peer, tmp_path: Path) 
         clock.commanded()
         running = len(commands)
 
-        def jump(nanoseconds: int) -> None:
-            # No state is under way any longer.
-            clock.report()
-            clock.set(clock.now + nanoseconds)
-            clock.wait(lambda: _labels(commands)[-1] == "halt", "the halt action")
-
         # Forwards: what is known of the state is old, and hours of ticks do not come at once.
-        jump(3600 * 10**9)
+        clock.jump(3600)
+        clock.wait(lambda: _labels(commands)[-1] == "halt", "the halt action")
         for _ in range(20):
             clock.step()
         assert clock.report()["condition"] == "waiting for state"
@@ -376,7 +367,8 @@ def test_the_clock_may_jump_either_way(domain: int, peer: Peer, tmp_path: Path) 
 
         # Backwards, and on past the moments at which states came before.
         then, came = clock.now, len(commands)
-        jump(-2 * 10**8)
+        clock.jump(-0.2)
+        clock.wait(lambda: _labels(commands)[-1] == "halt", "the halt action")
         while clock.now < then + 10**8:
             clock.step()
         assert clock.report()["condition"] == "waiting for state"
@@ -442,7 +434,8 @@ def test_a_state_outside_of_what_was_shown_is_counted_and_reported_while_the_tre
 
         def reported() -> Any:
             one = peer.diagnostics.get(EXECUTION)
-            return one if one and values_of(one)["novelty"].startswith("x is 3, 2 above") else None
+            novelty = values_of(one).get("novelty", "") if one else ""
+            return one if novelty.startswith("x is 3, 2 above") else None
 
         said = robot.until(reported)
         assert int(values_of(said)["states outside what was shown"]) > 0
