@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from ros_processes import NodeProcess, Peer, own_domain
+from ros_processes import NodeProcess, Peer
 from std_msgs.msg import Bool, Float64MultiArray, String
 
 from rebt_ros import offline
@@ -42,18 +41,6 @@ TREE = Group(
         ),
     ),
 )
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    with own_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def peer(domain: int) -> Iterator[Peer]:
-    with Peer(domain) as one:
-        yield one
 
 
 @pytest.fixture
