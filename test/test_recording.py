@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from recording_examples import FEATURES, ROWS, assert_same
 
 from rebt_ros.demonstration.builder import LARGEST_VALUE
 from rebt_ros.demonstration.demonstration import Demonstration, Row
@@ -28,15 +29,6 @@ from rebt_ros.storage.recording import (
 from rebt_ros.storage.recording_rows import LABEL, record_type
 
 CHECKOUT = Path(__file__).resolve().parents[1]
-FEATURES = (
-    Feature("front", topic="/state", index=0),
-    Feature('left, "near"', topic="/state", index=1),
-)
-ROWS = (
-    Row(1_700_000_000_000_000_001, "/action", "go", None, (0.1, -2.0)),
-    Row(1_700_000_000_000_000_002, "/action", 'say "hi", twice', "go", (1 / 3, 5e-324)),
-    Row(1_700_000_000_000_000_003, "/action", "go", 'say "hi", twice', (1e38, -0.0)),
-)
 
 
 def written(directory: Path, rows=ROWS) -> Path:
@@ -44,15 +36,6 @@ def written(directory: Path, rows=ROWS) -> Path:
         for row in rows:
             writer.write(row)
     return writer.path
-
-
-def assert_same(one: Demonstration, other: Demonstration) -> None:
-    assert one.features == other.features
-    assert one.states.tobytes() == other.states.tobytes()
-    assert one.stamps.tolist() == other.stamps.tolist()
-    assert (one.actions, one.channels) == (other.actions, other.channels)
-    assert one.chosen.tolist() == other.chosen.tolist()
-    assert one.channel.tolist() == other.channel.tolist()
 
 
 def test_a_recording_reads_back_to_the_last_bit(tmp_path):
