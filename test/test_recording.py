@@ -1,5 +1,6 @@
 """Recordings: what was acknowledged is on disk, to the last bit, and damage is named."""
 
+import json
 import os
 import re
 import signal
@@ -69,12 +70,24 @@ def test_any_rows_survive(tmp_path_factory, values):
     assert_same(read_recording(writer.path).demonstration, expected)
 
 
+#: What the snippet of the documentation has read, for the test.
+TELL = """
+import sys
+assert "rebt_ros" not in sys.modules
+table = {name: rows[name].tolist() for name in rows.dtype.names}
+names = [(int(number), text) for number, text in labels.items()]
+print(json.dumps([head, names, table]))
+"""
+
+
 def test_numpy_alone_reads_a_recording_as_documented(tmp_path):
     documentation = (CHECKOUT / "docs" / "formats.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", documentation, re.DOTALL)
-    names: dict[str, object] = {"path": written(tmp_path)}
-    exec(code, names)
-    assert names["head"] == {
+    code = f"path = {str(written(tmp_path))!r}\n{code}{TELL}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    head, labels, rows = json.loads(done.stdout)
+    labels = dict(labels)
+    assert head == {
         "version": 2,
         "sample_rate": None,
         "features": [
@@ -83,11 +96,10 @@ def test_numpy_alone_reads_a_recording_as_documented(tmp_path):
         ],
         "channels": ["/action"],
     }
-    rows, labels = names["rows"], names["labels"]
     assert [labels[code] for code in rows["action"]] == [row.action for row in ROWS]
     assert [labels[code] for code in rows["last_action"]] == ["", "go", 'say "hi", twice']
-    assert rows["state"].tolist() == [list(row.state) for row in ROWS]
-    assert rows["stamp"].tolist() == [row.stamp for row in ROWS]
+    assert rows["state"] == [list(row.state) for row in ROWS]
+    assert rows["stamp"] == [row.stamp for row in ROWS]
 
 
 def test_a_recording_can_be_read_after_every_row(tmp_path):
