@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from collections.abc import Sequence as Sequence_
 from dataclasses import dataclass, replace
@@ -44,13 +45,21 @@ def where_x_is_small(small: Action, otherwise: Action) -> Node:
 READS_X = learned(where_x_is_small(GO, TURN))
 
 
-def status(peer: Peer, condition: str, *, robot: Any = None, **values: str) -> Any:
-    """Waits until the executor reports a condition; a robot sends its state meanwhile."""
+def status(
+    peer: Peer, condition: str, *, robot: Any = None, anew: bool = False, **values: str
+) -> Any:
+    """Waits until the executor reports a condition, or does so anew.
+
+    A robot sends its state meanwhile.
+    """
+    since = time.time_ns() if anew else 0
     keys = {key.replace("_", " "): value for key, value in values.items()}
 
     def reported() -> Any:
         latest = peer.diagnostics.get(EXECUTION)
         if latest is None or values_of(latest)["condition"] != condition:
+            return None
+        if peer.reported[EXECUTION] <= since:
             return None
         return latest if keys.items() <= values_of(latest).items() else None
 

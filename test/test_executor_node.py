@@ -74,7 +74,7 @@ def test_a_stale_state_halts_the_tree_and_a_fresh_one_resumes(
         robot = Robot(peer)
         commands = timed_commands(peer)
         robot.obeys("go")
-        status(peer, "waiting for state")
+        status(peer, "waiting for state", anew=True)
         silent = peer.reported[EXECUTION]
         assert report(peer)["condition"] == "waiting for state"
         resumed = time.time_ns()
@@ -188,10 +188,11 @@ def test_an_action_runs_until_its_result_comes(domain: int, peer: Peer, tmp_path
         "rate": 100.0,
     }
     with NodeProcess("executor_node", domain, tmp_path, parameters):
-        publish(peer, learned(tree))
+        # The tree reads no state, so that its first command comes at once.
         robot = Robot(peer)
         snapshots = peer.listen(String, "/executor/snapshot")
         commands = robot.commands
+        publish(peer, learned(tree))
 
         def sent(*labels: str) -> None:
             peer.wait_until(
