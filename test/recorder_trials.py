@@ -203,14 +203,15 @@ def load_recorder(
                 return load.sent()
 
             sent = peer.wait_until(ended, seconds * 3 + PATIENCE, "the end of the load")
-            peer.wait_until(
-                lambda: (
-                    int(values_of(peer.diagnostics[RECORDER])["rows"]) >= sent["actions"]
-                    and peer.diagnostics[RECORDER] is not last[0]
-                ),
-                what="the last row",
-            )
-            values = values_of(peer.diagnostics[RECORDER])
+            report = peer.anew(RECORDER)
+
+            def complete() -> dict[str, str] | None:
+                said = values_of(status) if (status := report()) else {}
+                # What is lost is not waited for.
+                whole = int(said.get("rows", 0)) >= sent["actions"]
+                return said if whole or int(said.get("messages lost", 0)) else None
+
+            values = peer.wait_until(complete, what="the last row")
             cpu = cpu_seconds(recorder.process.pid) / seconds
         assert recorder.stop() == 0
         known = ("rows lost", "messages lost", "message lost", "write error")

@@ -38,6 +38,9 @@ PATIENCE = 60.0
 #: A limit for what must not happen while a process of a test gets no time to run (seconds).
 AGES = 600.0
 
+#: Makes it quick to wait for deliveries; for the test's own process, not for the nodes.
+_PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", str(Path(__file__).with_name("prompt_answers.xml")))
+
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -116,6 +119,7 @@ class NodeProcess:
             ROS_LOG_DIR=str(directory / "log"),
             PYTHONPATH=os.pathsep.join([str(CHECKOUT), os.environ.get("PYTHONPATH", "")]),
         )
+        environment.pop(_PROFILES[0], None)
         self._errors = directory / f"{module}.{time.monotonic_ns()}.stderr"
         with self._errors.open("wb") as errors:
             self.process = subprocess.Popen(
@@ -202,12 +206,14 @@ class Peer:
 
     def __init__(self, domain: int) -> None:
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        os.environ.setdefault(*_PROFILES)
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain)
         self.node = Node("test_peer", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._publishers: dict[str, Any] = {}
+        self._latest: Any = None
         self._clients: dict[str, Any] = {}
         self.diagnostics: dict[str, Any] = {}
         """The latest status by the name of its source."""
@@ -260,19 +266,24 @@ class Peer:
         self.publish(String(data=label), topic)
 
     def publish(self, message: Any, topic: str) -> None:
-        """Publishes; the first message of a topic waits until all subscribers have it."""
+        """Publishes what all subscribers receive after that which was published before.
+
+        Within a topic that is so anyway.  Otherwise a subscriber that does not know of a publisher
+        yet, or stands still, would take messages late, and those of another topic before them.
+        """
         first = topic not in self._publishers
         publisher = self.connect(type(message), topic)
+        if self._latest not in (None, publisher):
+            _wait_for_delivery(self._latest)
         publisher.publish(message)
+        self._latest = publisher
         if first:
-            # A subscriber that is known here may not know of this publisher yet: until it does,
-            # it takes messages late, and those of another topic before them.
-            publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
+            _wait_for_delivery(publisher)
 
     def deliver(self) -> None:
         """Waits until all subscribers have received what was published."""
         for publisher in self._publishers.values():
-            publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
+            _wait_for_delivery(publisher)
 
     def listen(self, kind: type, topic: str, qos: Any = 1000) -> list[Any]:
         """A list to which the messages of a topic are added."""
@@ -335,6 +346,11 @@ class Peer:
             self.diagnostics[status.name] = status
             self.reported[status.name] = info["source_timestamp"]
             self.stamps[status.name] = Time.from_msg(message.header.stamp).nanoseconds
+
+
+def _wait_for_delivery(publisher: Any) -> None:
+    """Waits until all subscribers have received what was published reliably."""
+    publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
 
 
 def values_of(status: Any) -> dict[str, str]:
