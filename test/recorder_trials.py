@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from load_publisher import ACTIONS
-from ros_processes import CHECKOUT, NodeProcess, Peer, own_domain, values_of
+from ros_processes import CHECKOUT, PATIENCE, NodeProcess, Peer, own_domain, values_of
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.storage.recording import is_recording, read_recording
@@ -104,7 +104,7 @@ def kill_recorders(kills: int, directory: Path, chance: random.Random) -> Killin
             seen = set(demonstrations.glob("*"))
             with NodeProcess("recorder_node", domain, directory) as recorder:
                 if number % 4 < 3:
-                    peer.wait_until(lambda: _acknowledged(peer), 60, "a row on /diagnostics")
+                    peer.wait_until(lambda: _acknowledged(peer), what="a row on /diagnostics")
                 _pass(peer, chance.uniform(0, 2.5))
                 recorder.stop(signal.SIGKILL)
                 _pass(peer, 0.2)
@@ -202,16 +202,16 @@ def load_recorder(
                     memory.append(_resident(recorder.process.pid))
                 return load.sent()
 
-            sent = peer.wait_until(ended, seconds * 3 + 30, "the end of the load")
-            peer.wait_until(
-                lambda: (
-                    int(values_of(peer.diagnostics[RECORDER])["rows"]) >= sent["actions"]
-                    and peer.diagnostics[RECORDER] is not last[0]
-                ),
-                10,
-                "the last row",
-            )
-            values = values_of(peer.diagnostics[RECORDER])
+            sent = peer.wait_until(ended, seconds * 3 + PATIENCE, "the end of the load")
+            report = peer.anew(RECORDER)
+
+            def complete() -> dict[str, str] | None:
+                said = values_of(status) if (status := report()) else {}
+                # What is lost is not waited for.
+                whole = int(said.get("rows", 0)) >= sent["actions"]
+                return said if whole or int(said.get("messages lost", 0)) else None
+
+            values = peer.wait_until(complete, what="the last row")
             cpu = cpu_seconds(recorder.process.pid) / seconds
         assert recorder.stop() == 0
         known = ("rows lost", "messages lost", "message lost", "write error")

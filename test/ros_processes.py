@@ -20,11 +20,13 @@ from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.time import Time
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 from std_srvs.srv import SetBool, Trigger
 
@@ -32,6 +34,12 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 
 #: How long a test waits for something that should happen at once, on a busy machine (seconds).
 PATIENCE = 60.0
+
+#: A limit for what must not happen while a process of a test gets no time to run (seconds).
+AGES = 600.0
+
+#: Makes it quick to wait for deliveries; for the test's own process, not for the nodes.
+_PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", str(Path(__file__).with_name("prompt_answers.xml")))
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -111,6 +119,7 @@ class NodeProcess:
             ROS_LOG_DIR=str(directory / "log"),
             PYTHONPATH=os.pathsep.join([str(CHECKOUT), os.environ.get("PYTHONPATH", "")]),
         )
+        environment.pop(_PROFILES[0], None)
         self._errors = directory / f"{module}.{time.monotonic_ns()}.stderr"
         with self._errors.open("wb") as errors:
             self.process = subprocess.Popen(
@@ -188,21 +197,30 @@ def _yaml(value: object) -> str:
 class Peer:
     """The test's own node: publishes, listens and calls services.
 
+    A process may stand still for seconds while the others go on.  So nothing here takes it for
+    granted that who is known knows us as well, or that what comes late was also sent late.
+
     Args:
         domain: ROS domain id.
     """
 
     def __init__(self, domain: int) -> None:
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        os.environ.setdefault(*_PROFILES)
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain)
         self.node = Node("test_peer", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._publishers: dict[str, Any] = {}
+        self._latest: Any = None
         self._clients: dict[str, Any] = {}
         self.diagnostics: dict[str, Any] = {}
         """The latest status by the name of its source."""
+        self.reported: dict[str, int] = {}
+        """When that was sent, nanoseconds."""
+        self.stamps: dict[str, int] = {}
+        """What time it was for the source, which may use simulated time, nanoseconds."""
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._note, 10)
 
     def close(self) -> None:
@@ -225,12 +243,15 @@ class Peer:
         """Takes messages until the condition holds, and returns its value."""
         return wait_until(condition, timeout, meanwhile=self.spin_once, what=what)
 
-    def connect(self, kind: type, topic: str, qos: Any = 1000) -> Any:
-        """A publisher that has a subscriber."""
+    def connect(self, kind: type, topic: str, qos: Any = 1000, subscribers: int = 1) -> Any:
+        """A publisher that has subscribers."""
         if topic not in self._publishers:
             self._publishers[topic] = self.node.create_publisher(kind, topic, qos)
         publisher = self._publishers[topic]
-        self.wait_until(publisher.get_subscription_count, what=f"a subscriber of {topic}")
+        self.wait_until(
+            lambda: publisher.get_subscription_count() >= subscribers,
+            what=f"{subscribers} subscribers of {topic}",
+        )
         return publisher
 
     def state(
@@ -245,14 +266,24 @@ class Peer:
         self.publish(String(data=label), topic)
 
     def publish(self, message: Any, topic: str) -> None:
-        """Publishes; the first message of a topic waits until all subscribers have it."""
+        """Publishes what all subscribers receive after that which was published before.
+
+        Within a topic that is so anyway.  Otherwise a subscriber that does not know of a publisher
+        yet, or stands still, would take messages late, and those of another topic before them.
+        """
         first = topic not in self._publishers
         publisher = self.connect(type(message), topic)
+        if self._latest not in (None, publisher):
+            _wait_for_delivery(self._latest)
         publisher.publish(message)
+        self._latest = publisher
         if first:
-            # A subscriber that is known here may not know of this publisher yet: until it does,
-            # it takes messages late, and those of another topic before them.
-            publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
+            _wait_for_delivery(publisher)
+
+    def deliver(self) -> None:
+        """Waits until all subscribers have received what was published."""
+        for publisher in self._publishers.values():
+            _wait_for_delivery(publisher)
 
     def listen(self, kind: type, topic: str, qos: Any = 1000) -> list[Any]:
         """A list to which the messages of a topic are added."""
@@ -261,24 +292,65 @@ class Peer:
         self.wait_until(lambda: self.node.count_publishers(topic), what=f"a publisher of {topic}")
         return heard
 
+    def introduce(self, node: str) -> None:
+        """Waits until a node knows all that was opened here so far.
+
+        A process learns of others' publishers, subscribers and clients in the order in which they
+        were opened, so that it knows those before a client whose call it answers.
+        """
+        self.ask(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=[]))
+
+    def ask(self, kind: Any, service: str, request: Any) -> Any:
+        """Calls a service to which it makes no difference how often it is called.
+
+        An answer is lost where the service does not know yet who asks, so it is asked again.
+        """
+        client = self.node.create_client(kind, service)
+        self.wait_until(client.service_is_ready, what=service)
+        end = time.monotonic() + PATIENCE
+        while True:
+            future = client.call_async(request)
+            try:
+                self.wait_until(future.done, 3.0, what=f"the answer of {service}")
+            except TimeoutError:
+                if time.monotonic() > end:
+                    raise
+            else:
+                self.node.destroy_client(client)
+                return future.result()
+
     def begin(self, service: str, data: bool | None = None) -> Any:
-        """Calls a service; returns the future of its answer."""
+        """Calls a service of a node; returns the future of its answer."""
         kind = Trigger if data is None else SetBool
         if service not in self._clients:
             self._clients[service] = self.node.create_client(kind, service)
+            self.introduce(service.rpartition("/")[0])
         client = self._clients[service]
         self.wait_until(client.service_is_ready, what=service)
         return client.call_async(kind.Request() if data is None else kind.Request(data=data))
 
     def call(self, service: str, data: bool | None = None, timeout: float = PATIENCE) -> Any:
-        """Calls a service and waits for its answer."""
+        """Calls a service once what was published is delivered, and waits for its answer."""
+        self.deliver()
         future = self.begin(service, data)
         self.wait_until(future.done, timeout, what=f"the answer of {service}")
         return future.result()
 
-    def _note(self, message: DiagnosticArray) -> None:
+    def anew(self, source: str) -> Callable[[], Any]:
+        """A condition: the status that a source sends from now on, of what is so by then."""
+        now = time.time_ns()
+        return lambda: self.diagnostics[source] if self.reported.get(source, 0) > now else None
+
+    def _note(self, message: DiagnosticArray, info: Mapping[str, Any]) -> None:
         for status in message.status:
             self.diagnostics[status.name] = status
+            self.reported[status.name] = info["source_timestamp"]
+            self.stamps[status.name] = Time.from_msg(message.header.stamp).nanoseconds
+
+
+def _wait_for_delivery(publisher: Any) -> None:
+    """Waits until all subscribers have received what was published reliably."""
+    publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
 
 
 def values_of(status: Any) -> dict[str, str]:

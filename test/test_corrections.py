@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from executor_examples import status
-from ros_processes import NodeProcess, Peer, values_of
+from ros_processes import AGES, NodeProcess, Peer, values_of
 from std_msgs.msg import String
 
 from rebt_ros.storage.inputs import load
@@ -95,7 +95,9 @@ def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
 ) -> None:
     executing = {
         "rate": 50.0,
-        "takeover_timeout": 0.5,
+        # Longer than this process may stand still while it sends what a person does.
+        "takeover_timeout": 4.0,
+        "state_timeout": AGES,
         "novelty": novelty,
         "halt_action": "wait" if novelty == "hold" else "",
     }
@@ -105,14 +107,20 @@ def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
         NodeProcess("executor_node", domain, tmp_path, executing),
     ):
         course = Course(peer)
+        # The recorder and the executor.
+        peer.connect(String, "action", subscribers=2)
+
+        def recorded(rows: int) -> None:
+            peer.wait_until(
+                lambda: (
+                    (one := peer.diagnostics.get("recorder: recording"))
+                    and values_of(one)["rows"] == str(rows)
+                ),
+                what=f"{rows} rows",
+            )
+
         shown = course.demonstrate(lambda: course.robot.gripped)
-        peer.wait_until(
-            lambda: (
-                (one := peer.diagnostics.get("recorder: recording"))
-                and values_of(one)["rows"] == str(shown)
-            ),
-            what="the rows",
-        )
+        recorded(shown)
         answer = peer.call("/learner/relearn")
         assert f"{shown} rows of 1 demonstration" in answer.message
         assert peer.call("/executor/enable", True).success
@@ -134,6 +142,7 @@ def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
 
         # A person opens it, and the robot goes on by itself.
         corrected = course.demonstrate(lambda: course.robot.left_to_open == 0)
+        recorded(shown + corrected)
         course.until(lambda: course.robot.gripped, "the goal")
         assert peer.call("/recorder/record", False).success
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,8 +12,21 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from executor_examples import GO, STOP, TURN, Robot, learned, publish, status, where_x_is_small
-from ros_processes import NodeProcess, Peer, values_of
+from executor_examples import (
+    EXECUTION,
+    GO,
+    STOP,
+    TURN,
+    Robot,
+    SimulatedTime,
+    learned,
+    publish,
+    report,
+    status,
+    timed_commands,
+    where_x_is_small,
+)
+from ros_processes import AGES, NodeProcess, Peer, values_of
 from std_msgs.msg import String
 
 from rebt_ros.behavior_tree.document import dumps
@@ -58,12 +72,15 @@ def test_a_stale_state_halts_the_tree_and_a_fresh_one_resumes(
     parameters = {"tree_file": tmp_path / "tree.json", "enabled": True, "state_timeout": 0.2}
     with NodeProcess("executor_node", domain, tmp_path, parameters):
         robot = Robot(peer)
+        commands = timed_commands(peer)
         robot.obeys("go")
-        status(peer, "waiting for state")
-        silent = len(robot.commands)
-        status(peer, "waiting for state")
-        assert len(robot.commands) == silent
+        status(peer, "waiting for state", anew=True)
+        silent = peer.reported[EXECUTION]
+        assert report(peer)["condition"] == "waiting for state"
+        resumed = time.time_ns()
         robot.obeys("go")
+        # By now, all that was sent before is here.
+        assert not [one for one in commands if silent < one.sent < resumed]
 
 
 def test_no_command_follows_the_answer_to_a_disabling_call(
@@ -73,20 +90,18 @@ def test_no_command_follows_the_answer_to_a_disabling_call(
     with NodeProcess("executor_node", domain, tmp_path, parameters):
         publish(peer, learned(where_x_is_small(GO, TURN)))
         robot = Robot(peer)
+        commands = timed_commands(peer)
         robot.obeys("go")
         call = peer.begin("/executor/enable", False)
         robot.until(call.done)
-        # What was sent before the answer may still be under way: the next report is behind it.
-        peer.diagnostics.clear()
-        robot.until(lambda: "executor: execution" in peer.diagnostics)
-        sent = values_of(peer.diagnostics["executor: execution"])["commands"]
-        assert values_of(peer.diagnostics["executor: execution"])["condition"] == "disabled"
-        peer.diagnostics.clear()
-        robot.until(lambda: "executor: execution" in peer.diagnostics)
-        assert values_of(peer.diagnostics["executor: execution"])["commands"] == sent
-        assert len(robot.commands) == int(sent)
+        answered = time.time_ns()
+        first, second = report(peer, robot=robot), report(peer, robot=robot)
+        assert first["condition"] == second["condition"] == "disabled"
+        assert first["commands"] == second["commands"]
+        enabled = time.time_ns()
         assert peer.call("/executor/enable", True).success
         robot.obeys("go")
+        assert not [one for one in commands if answered < one.sent < enabled]
 
 
 def test_a_refused_document_keeps_the_tree_running(domain: int, peer: Peer, tmp_path: Path) -> None:
@@ -108,7 +123,7 @@ def test_a_refused_document_keeps_the_tree_running(domain: int, peer: Peer, tmp_
             publish(peer, document)
             robot.until(
                 lambda count=count: (
-                    (one := peer.diagnostics.get("executor: execution"))
+                    (one := peer.diagnostics.get(EXECUTION))
                     and values_of(one)["refused trees"] == str(count)
                 ),
                 f"refusal {count}",
@@ -136,7 +151,7 @@ def test_bad_state_messages_are_counted_and_let_the_state_go_stale(
             robot.state = state
             robot.until(
                 lambda kind=kind: (
-                    (one := peer.diagnostics.get("executor: execution"))
+                    (one := peer.diagnostics.get(EXECUTION))
                     and values_of(one)["condition"] == "waiting for state"
                     and kind in values_of(one)
                 ),
@@ -147,7 +162,12 @@ def test_bad_state_messages_are_counted_and_let_the_state_go_stale(
 
 
 def test_commands_on_change_are_sent_once(domain: int, peer: Peer, tmp_path: Path) -> None:
-    parameters = {"enabled": True, "publish": "on_change", "rate": 100.0}
+    parameters = {
+        "enabled": True,
+        "publish": "on_change",
+        "rate": 100.0,
+        "state_timeout": AGES,
+    }
     with NodeProcess("executor_node", domain, tmp_path, parameters):
         publish(peer, learned(where_x_is_small(GO, TURN)))
         robot = Robot(peer)
@@ -168,10 +188,11 @@ def test_an_action_runs_until_its_result_comes(domain: int, peer: Peer, tmp_path
         "rate": 100.0,
     }
     with NodeProcess("executor_node", domain, tmp_path, parameters):
-        publish(peer, learned(tree))
+        # The tree reads no state, so that its first command comes at once.
         robot = Robot(peer)
         snapshots = peer.listen(String, "/executor/snapshot")
         commands = robot.commands
+        publish(peer, learned(tree))
 
         def sent(*labels: str) -> None:
             peer.wait_until(
@@ -223,29 +244,32 @@ def test_a_tree_looks_back_at_ticks_since_it_was_last_halted_or_swapped(
         features=(lagged,),
         tree=Selector((Sequence((known_before, GO)), TURN)),
     )
-    parameters = {"enabled": True, "publish": "on_change", "rate": 100.0, "state_timeout": 2.0}
+    parameters = {"enabled": True, "rate": 100.0, "use_sim_time": True, "state_timeout": 60.0}
     with NodeProcess("executor_node", domain, tmp_path, parameters):
         publish(peer, lagging)
-        robot = Robot(peer)
+        commands = timed_commands(peer)
+        clock = SimulatedTime(peer, commands)
+        clock.commanded()
 
-        def did(times: int) -> None:
-            expected = ["turn", "go"] * times
-            robot.until(lambda: [one.data for one in robot.commands] == expected, f"{expected}")
+        def looks_back_from_now_on() -> None:
+            assert [clock.tick().label for _ in range(3)] == ["turn", "go", "go"]
 
-        did(1)
+        assert [one.label for one in commands] == ["turn", *["go"] * (len(commands) - 1)]
         assert peer.call("/executor/enable", False).success
         assert peer.call("/executor/enable", True).success
-        did(2)
+        looks_back_from_now_on()
         # No state for a while.
-        peer.diagnostics.clear()
-        status(peer, "waiting for state")
-        did(3)
+        clock.jump(100.0)
+        assert clock.report()["condition"] == "waiting for state"
+        looks_back_from_now_on()
         publish(peer, replace(lagging, actions=(*lagging.actions, STOP)))
-        did(4)
+        clock.until(lambda: values_of(peer.diagnostics[EXECUTION])["actions"] == "3")
+        looks_back_from_now_on()
 
 
 def test_snapshots_are_sent_when_something_changed(domain: int, peer: Peer, tmp_path: Path) -> None:
-    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True, "rate": 100.0}):
+    parameters = {"enabled": True, "rate": 100.0, "state_timeout": AGES}
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
         publish(peer, learned(where_x_is_small(GO, TURN)))
         robot = Robot(peer)
         robot.obeys("go")
@@ -256,8 +280,8 @@ def test_snapshots_are_sent_when_something_changed(domain: int, peer: Peer, tmp_
         assert first["commands"] == {"action": "go"}
         assert first["tip"]
         before = len(snapshots)
-        peer.diagnostics.clear()
-        robot.until(lambda: "executor: execution" in peer.diagnostics)
+        report(peer, robot=robot)
+        report(peer, robot=robot)
         assert len(snapshots) == before
         robot.state = (7.0, 1.0)
         robot.until(lambda: json.loads(snapshots[-1].data)["commands"]["action"] == "turn")
@@ -270,7 +294,7 @@ def test_a_tree_from_a_table_reads_the_state_topic_in_its_order(
     parameters = {"tree_file": tmp_path / "tree.json", "enabled": True, "state_topic": "sensors"}
     arguments = ["-r", "sensors:=/state", "-r", "__ns:=/robot", "-r", "command:=/command"]
     with NodeProcess("executor_node", domain, tmp_path, parameters, arguments):
-        Robot(peer).obeys("go")
+        Robot(peer, "/robot/executor").obeys("go")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

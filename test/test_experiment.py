@@ -27,6 +27,9 @@ from rebt_ros.simulation.experiment_config import ExperimentConfig
 MODULE = "rebt_ros.commands.experiment"
 SETTINGS = Settings(ticks=200)
 
+#: So many configurations that a run of them is stopped before its end, however late it is stopped.
+MANY = 150
+
 
 def condition(variable: str) -> dict[str, Any]:
     return {"name": variable, "type_": "condition", "target_state": variable, "threshold": 0.5}
@@ -234,7 +237,7 @@ def test_a_worker_of_other_versions_is_refused(
 def test_a_killed_run_leaves_no_process_and_is_resumed_to_the_same_report(
     configurations: Path, tmp_path: Path
 ) -> None:
-    copies(configurations, 6)
+    copies(configurations, MANY)
     out, straight = tmp_path / "out", tmp_path / "straight"
     with started(configurations, "--out", out, "--jobs", "2") as running:
         wait_for(lambda: any((out / "results").glob("*.json")), running)
@@ -242,7 +245,11 @@ def test_a_killed_run_leaves_no_process_and_is_resumed_to_the_same_report(
     wait_for(lambda: not group_exists(running.pid))
     assert not (out / "report.json").exists()
     kept = {path: path.read_bytes() for path in (out / "results").glob("*.json")}
-    assert 1 <= len(kept) < 6
+    assert 1 <= len(kept) < MANY
+    # A few of the others are enough.
+    others = [path for path in configurations.iterdir() if out / "results" / path.name not in kept]
+    for path in others[3:]:
+        path.unlink()
     run_experiment(configurations, out, SETTINGS, jobs=1)
     assert {path: path.read_bytes() for path in kept} == kept
     run_experiment(configurations, straight, SETTINGS, jobs=1)
@@ -254,7 +261,7 @@ def test_a_killed_run_leaves_no_process_and_is_resumed_to_the_same_report(
 def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(
     configurations: Path, tmp_path: Path
 ) -> None:
-    copies(configurations, 30)
+    copies(configurations, MANY)
     out = tmp_path / "out"
     with started(configurations, "--out", out, "--jobs", "2") as running:
         wait_for(lambda: any((out / "results").glob("*.json")), running)

@@ -63,12 +63,12 @@ def _busy(seconds: float) -> None:
         lambda _: 1 / 0,
         lambda _: _raise(MemoryError()),
         lambda _: _raise(InputError("no full stop")),
-        lambda _: _busy(0.03),
+        lambda _: _busy(0.3),
     ],
     ids=["a crash", "no memory", "no sentence", "a hang"],
 )
 def test_the_fuzzer_notices(read: object, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(campaign, "LONGEST", 0.02)
+    monkeypatch.setattr(campaign, "LONGEST", 0.2)
     assert _outcome_of(read).failed == 3
     assert not _outcome_of(lambda _: None).failed
 

@@ -43,10 +43,11 @@ def bomb() -> bytes:
 @contextmanager
 def refused(match: str) -> Iterator[None]:
     """Within a second, with a sentence."""
-    began = time.monotonic()
+    # Of the processor, as a busy machine is no bomb.
+    began = time.process_time()
     with pytest.raises(InputError, match=match) as raised:
         yield
-    assert time.monotonic() - began < 1.0
+    assert time.process_time() - began < 1.0
     assert str(raised.value).endswith(".")
 
 

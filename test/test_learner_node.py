@@ -40,16 +40,9 @@ def _record(directory: Path, rows: int = 60, actions: tuple[str, ...] = ("go", "
 
 
 def _set(peer: Peer, **values: object) -> list[Any]:
-    client = peer.node.create_client(SetParameters, "learner/set_parameters")
-    peer.wait_until(client.service_is_ready, what="the parameter service")
-    request = SetParameters.Request(
-        parameters=[
-            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
-        ]
-    )
-    future = client.call_async(request)
-    peer.wait_until(future.done, what="the answer of the parameter service")
-    return list(future.result().results)
+    parameters = [Parameter(name, value=one).to_parameter_msg() for name, one in values.items()]
+    request = SetParameters.Request(parameters=parameters)
+    return list(peer.ask(SetParameters, "learner/set_parameters", request).results)
 
 
 def _latest(peer: Peer, heard: list[String], count: int) -> LearnedTree:
@@ -97,11 +90,16 @@ def _child(peer: Peer) -> int:
     return int(values_of(_status(peer, ""))["learning process"])
 
 
-def _stuck(peer: Peer) -> tuple[int, Any]:
-    """The learning process, stopped while it should learn, and the future of the answer."""
+def _ask_in_vain(peer: Peer) -> tuple[int, Any]:
+    """The learning process, stopped before it is to learn, and the future of the answer."""
     child = _child(peer)
     os.kill(child, signal.SIGSTOP)
-    call = peer.begin("/learner/relearn")
+    return child, peer.begin("/learner/relearn")
+
+
+def _stuck(peer: Peer) -> tuple[int, Any]:
+    """The same once it should learn, where there is no limit to that."""
+    child, call = _ask_in_vain(peer)
     _status(peer, "learning since")
     return child, call
 
@@ -265,7 +263,7 @@ def test_learning_can_be_cancelled_and_the_tree_before_stays(
 def test_learning_that_takes_too_long_is_stopped(domain: int, peer: Peer, tmp_path: Path) -> None:
     _record(tmp_path / "demonstrations")
     with NodeProcess("learner_node", domain, tmp_path, {"relearn_timeout": 1.5}) as learner:
-        _, call = _stuck(peer)
+        _, call = _ask_in_vain(peer)
         peer.wait_until(call.done, what="the answer")
         answer = call.result()
         assert (answer.success, "relearn_timeout (1.5 s)" in answer.message) == (False, True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -138,6 +139,53 @@ def test_a_bag_and_a_recording_of_the_same_messages_give_the_same_table_and_tree
     assert _learning(live).learned == _learning(offline).learned
 
 
+def _demonstrate(peer: Peer, chance: random.Random, demonstrations: int, rows: int) -> None:
+    """Shows what `_decide` says, and ends the recording."""
+    for left in reversed(range(demonstrations)):
+        for _ in range(rows):
+            state = _state(chance)
+            peer.state(*state, labels=FIELDS)
+            peer.action(_decide(state))
+            peer.spin_once()
+        if left:
+            answer = peer.call("/recorder/new_demonstration")
+        else:
+            answer = peer.call("/recorder/record", False)
+        assert f"recorded {rows} rows" in answer.message
+
+
+class Commanded:
+    """What the executor commands in one state after another."""
+
+    def __init__(self, peer: Peer) -> None:
+        self._peer = peer
+        self._commands = peer.listen(String, "command")
+
+    def first(self, state: tuple[float, ...], wanted: Callable[[str], bool]) -> str:
+        """The first command from now on, while the state is sent, that is one of the wanted."""
+
+        def heard() -> str | None:
+            self._peer.state(*state)
+            return next((one.data for one in self._commands if wanted(one.data)), None)
+
+        self._commands.clear()
+        return str(self._peer.wait_until(heard, what=f"a command in {state}"))
+
+    def in_all(self, states: list[tuple[float, ...]], expected: list[str]) -> list[str]:
+        """What it commands in each state, where something is expected that is not always the same.
+
+        First another action is commanded in another state: what comes next that is not this action
+        answers to the state in question, however late it comes.
+        """
+        got = []
+        for state, label in zip(states, expected, strict=True):
+            other = next(place for place, one in enumerate(expected) if one != label)
+            between = expected[other]
+            self.first(states[other], lambda one, between=between: one == between)
+            got.append(self.first(state, lambda one, between=between: one != between))
+        return got
+
+
 def test_what_was_shown_is_learned_and_commanded(domain: int, peer: Peer, tmp_path: Path) -> None:
     with (
         NodeProcess("recorder_node", domain, tmp_path) as recorder,
@@ -145,16 +193,7 @@ def test_what_was_shown_is_learned_and_commanded(domain: int, peer: Peer, tmp_pa
         NodeProcess("executor_node", domain, tmp_path, {"rate": 200.0}) as executor,
     ):
         chance = random.Random(1)
-        for run in range(4):
-            for _ in range(100):
-                state = _state(chance)
-                peer.state(*state, labels=FIELDS)
-                peer.action(_decide(state))
-                peer.spin_once()
-            if run < 3:
-                answer = peer.call("/recorder/new_demonstration")
-                assert "recorded 100 rows" in answer.message
-        assert "recorded 100 rows" in peer.call("/recorder/record", False).message
+        _demonstrate(peer, chance, demonstrations=4, rows=100)
 
         trees = peer.listen(String, "behavior_tree", LATCHED)
         answer = peer.call("/learner/relearn")
@@ -168,7 +207,7 @@ def test_what_was_shown_is_learned_and_commanded(domain: int, peer: Peer, tmp_pa
         expected = _predictions(learning, states)
         assert set(expected) == {"charge", "stop", "go", "turn left", "turn right"}
 
-        commands = peer.listen(String, "command")
+        commanded = Commanded(peer)
         peer.wait_until(
             lambda: (
                 (one := peer.diagnostics.get("executor: execution"))
@@ -177,29 +216,13 @@ def test_what_was_shown_is_learned_and_commanded(domain: int, peer: Peer, tmp_pa
         )
         assert peer.call("/executor/enable", True).success
 
-        def commanded(state: tuple[float, ...], wanted: Any) -> str:
-            def heard() -> str | None:
-                peer.state(*state)
-                return next((one.data for one in commands if wanted(one.data)), None)
-
-            commands.clear()
-            return str(peer.wait_until(heard, what=f"a command in {state}"))
-
-        got = []
-        for state, label in zip(states, expected, strict=True):
-            # First another action in another state: what comes next that is not this action
-            # answers to the state in question, however late it comes.
-            other = next(place for place, one in enumerate(expected) if one != label)
-            between = expected[other]
-            commanded(states[other], lambda one, between=between: one == between)
-            got.append(commanded(state, lambda one, between=between: one != between))
-        assert got == expected
+        assert commanded.in_all(states, expected) == expected
 
         # A malformed document changes nothing.
         peer.connect(String, "behavior_tree", LATCHED).publish(String(data='{"format": '))
         executor.says("a behavior tree was refused (the tree before it stays)")
         label = expected[0]
-        assert commanded(states[0], lambda one: one == label) == label
+        assert commanded.first(states[0], lambda one: one == label) == label
 
         for node in (recorder, learner, executor):
             assert node.stop() == 0

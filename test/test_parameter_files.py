@@ -12,25 +12,10 @@ pytest.importorskip("rclpy")
 
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
-from ros_processes import CHECKOUT, PATIENCE, NodeProcess, Peer, own_domain
+from ros_processes import CHECKOUT, NodeProcess, Peer, own_domain
 
 #: What every node has.
 _BUILT_IN = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..*")
-
-
-def _ask(peer: Peer, kind: Any, service: str, request: Any) -> Any:
-    client = peer.node.create_client(kind, service)
-    peer.wait_until(client.service_is_ready, what=service)
-    # An answer is lost when the service has not yet heard of the one who asked, so ask again.
-    for patience in (5.0, 10.0, PATIENCE):
-        future = client.call_async(request)
-        try:
-            peer.wait_until(future.done, patience, what=f"the answer of {service}")
-            break
-        except TimeoutError:
-            if patience == PATIENCE:
-                raise
-    return future.result()
 
 
 def _parameters(node: str, directory: Path, arguments: list[str]) -> dict[str, Any]:
@@ -40,18 +25,15 @@ def _parameters(node: str, directory: Path, arguments: list[str]) -> dict[str, A
         NodeProcess(f"{node}_node", domain, directory, arguments=arguments) as process,
         Peer(domain) as peer,
     ):
-        listed = _ask(peer, ListParameters, f"{node}/list_parameters", ListParameters.Request())
+        listed = peer.ask(ListParameters, f"{node}/list_parameters", ListParameters.Request())
         names = [name for name in listed.result.names if not _BUILT_IN.fullmatch(name)]
-        described = _ask(
-            peer,
+        described = peer.ask(
             DescribeParameters,
             f"{node}/describe_parameters",
             DescribeParameters.Request(names=names),
         )
         assert [one.name for one in described.descriptors if not one.description] == []
-        got = _ask(
-            peer, GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names)
-        )
+        got = peer.ask(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names))
         assert process.stop() == 0
     return dict(zip(names, map(parameter_value_to_python, got.values), strict=True))
 

@@ -1,5 +1,6 @@
 """Recordings: what was acknowledged is on disk, to the last bit, and damage is named."""
 
+import json
 import os
 import re
 import signal
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from recording_examples import FEATURES, ROWS, assert_same
 
 from rebt_ros.demonstration.builder import LARGEST_VALUE
 from rebt_ros.demonstration.demonstration import Demonstration, Row
@@ -28,15 +30,6 @@ from rebt_ros.storage.recording import (
 from rebt_ros.storage.recording_rows import LABEL, record_type
 
 CHECKOUT = Path(__file__).resolve().parents[1]
-FEATURES = (
-    Feature("front", topic="/state", index=0),
-    Feature('left, "near"', topic="/state", index=1),
-)
-ROWS = (
-    Row(1_700_000_000_000_000_001, "/action", "go", None, (0.1, -2.0)),
-    Row(1_700_000_000_000_000_002, "/action", 'say "hi", twice', "go", (1 / 3, 5e-324)),
-    Row(1_700_000_000_000_000_003, "/action", "go", 'say "hi", twice', (1e38, -0.0)),
-)
 
 
 def written(directory: Path, rows=ROWS) -> Path:
@@ -44,15 +37,6 @@ def written(directory: Path, rows=ROWS) -> Path:
         for row in rows:
             writer.write(row)
     return writer.path
-
-
-def assert_same(one: Demonstration, other: Demonstration) -> None:
-    assert one.features == other.features
-    assert one.states.tobytes() == other.states.tobytes()
-    assert one.stamps.tolist() == other.stamps.tolist()
-    assert (one.actions, one.channels) == (other.actions, other.channels)
-    assert one.chosen.tolist() == other.chosen.tolist()
-    assert one.channel.tolist() == other.channel.tolist()
 
 
 def test_a_recording_reads_back_to_the_last_bit(tmp_path):
@@ -86,12 +70,24 @@ def test_any_rows_survive(tmp_path_factory, values):
     assert_same(read_recording(writer.path).demonstration, expected)
 
 
+#: What the snippet of the documentation has read, for the test.
+TELL = """
+import sys
+assert "rebt_ros" not in sys.modules
+table = {name: rows[name].tolist() for name in rows.dtype.names}
+names = [(int(number), text) for number, text in labels.items()]
+print(json.dumps([head, names, table]))
+"""
+
+
 def test_numpy_alone_reads_a_recording_as_documented(tmp_path):
     documentation = (CHECKOUT / "docs" / "formats.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", documentation, re.DOTALL)
-    names: dict[str, object] = {"path": written(tmp_path)}
-    exec(code, names)
-    assert names["head"] == {
+    code = f"path = {str(written(tmp_path))!r}\n{code}{TELL}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    head, labels, rows = json.loads(done.stdout)
+    labels = dict(labels)
+    assert head == {
         "version": 2,
         "sample_rate": None,
         "features": [
@@ -100,11 +96,10 @@ def test_numpy_alone_reads_a_recording_as_documented(tmp_path):
         ],
         "channels": ["/action"],
     }
-    rows, labels = names["rows"], names["labels"]
     assert [labels[code] for code in rows["action"]] == [row.action for row in ROWS]
     assert [labels[code] for code in rows["last_action"]] == ["", "go", 'say "hi", twice']
-    assert rows["state"].tolist() == [list(row.state) for row in ROWS]
-    assert rows["stamp"].tolist() == [row.stamp for row in ROWS]
+    assert rows["state"] == [list(row.state) for row in ROWS]
+    assert rows["stamp"] == [row.stamp for row in ROWS]
 
 
 def test_a_recording_can_be_read_after_every_row(tmp_path):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from recording_examples import FEATURES, ROWS, assert_same
 
-from rebt_ros.demonstration.demonstration import Demonstration, Row
-from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.errors import InputError
 from rebt_ros.storage.recording import read_recording, recordings
 
@@ -21,15 +21,6 @@ stamp,channel,action,last_action,front,"left, ""near\"""
 1700000000000000002,/action,"say ""hi"", twice",go,0.3333333333333333,5e-324
 1700000000000000003,/action,go,"say ""hi"", twice",1e+38,-0.0
 """
-FEATURES = (
-    Feature("front", topic="/state", index=0),
-    Feature('left, "near"', topic="/state", index=1),
-)
-ROWS = (
-    Row(1_700_000_000_000_000_001, "/action", "go", None, (0.1, -2.0)),
-    Row(1_700_000_000_000_000_002, "/action", 'say "hi", twice', "go", (1 / 3, 5e-324)),
-    Row(1_700_000_000_000_000_003, "/action", "go", 'say "hi", twice', (1e38, -0.0)),
-)
 
 
 def written(directory: Path, text: bytes = TEXT.encode()) -> Path:
@@ -40,14 +31,8 @@ def written(directory: Path, text: bytes = TEXT.encode()) -> Path:
 
 def test_an_old_recording_reads_back_to_the_last_bit(tmp_path: Path) -> None:
     read = read_recording(written(tmp_path))
-    expected = Demonstration.from_rows("", FEATURES, ROWS)
     assert read.notes == ()
-    assert read.demonstration.features == FEATURES
-    assert read.demonstration.states.tobytes() == expected.states.tobytes()
-    assert read.demonstration.stamps.tolist() == expected.stamps.tolist()
-    assert read.demonstration.actions == expected.actions
-    assert read.demonstration.chosen.tolist() == expected.chosen.tolist()
-    assert read.demonstration.channels == ("/action",)
+    assert_same(read.demonstration, Demonstration.from_rows("", FEATURES, ROWS))
 
 
 def test_a_torn_last_line_is_left_out_with_a_note(tmp_path: Path) -> None:

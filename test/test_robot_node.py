@@ -30,12 +30,9 @@ def _bearing(states: list[Float64MultiArray]) -> float:
 
 
 def _set(peer: Peer, name: str, value: object) -> Any:
-    client = peer.node.create_client(SetParameters, "robot/set_parameters")
-    peer.wait_until(client.service_is_ready, what="the parameter service")
     parameter = Parameter(name, value=value).to_parameter_msg()
-    future = client.call_async(SetParameters.Request(parameters=[parameter]))
-    peer.wait_until(future.done, what="the answer of the parameter service")
-    return future.result().results[0]
+    request = SetParameters.Request(parameters=[parameter])
+    return peer.ask(SetParameters, "robot/set_parameters", request).results[0]
 
 
 def test_it_publishes_named_states_and_stands_still_until_it_is_commanded(

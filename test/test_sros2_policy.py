@@ -134,6 +134,5 @@ def test_the_policy_allows_what_the_running_nodes_have_and_nothing_else(tmp_path
             peer.wait_until(lambda key=f"{node}: {task}": key in peer.diagnostics, what=node)
             peer.wait_until(
                 lambda node=node: found(peer, node) == granted(node),
-                10.0,
                 what=f"{granted(node)}, while the node has {found(peer, node)}",
             )

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import run
+from rebt_ros.commands.shell import add_seed, run
 from rebt_ros.errors import OptionError
 from rebt_ros.simulation.experiment_file import format_config
 from rebt_ros.simulation.experiment_generator import generate_configs
@@ -29,13 +29,7 @@ def _parser() -> argparse.ArgumentParser:
         "for simulate to read: 2 or 3 subtrees under a Parallel or a Sequence root.",
     )
     parser.add_argument("count", type=int, metavar="COUNT", help="how many")
-    parser.add_argument(
-        "--seed",
-        type=int,
-        default=0,
-        metavar="N",
-        help="equal numbers give equal files (default: %(default)s)",
-    )
+    add_seed(parser)
     parser.add_argument(
         "--out", type=Path, default=Path("experiments"), metavar="DIR", help="default: %(default)s"
     )

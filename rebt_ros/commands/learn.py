@@ -44,10 +44,19 @@ def _parser() -> argparse.ArgumentParser:
         "tree.json, summary.json and pictures of the tree.",
     )
     add_input_options(parser)
+    _add_output(parser)
+    defaults = LearnOptions()
+    _add_rows(parser, defaults)
+    _add_learning(parser, defaults)
+    _add_form(parser)
+    _add_judging(parser, defaults)
+    return parser
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("learned"), metavar="DIR", help="default: %(default)s"
     )
-    defaults = LearnOptions()
     parser.add_argument(
         "--levels",
         action="store_true",
@@ -61,18 +70,44 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N",
         help="with --levels: so many levels at most, evenly spread (default: %(default)s)",
     )
+
+
+def _add_rows(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
+    rows = parser.add_argument_group("rows to learn from")
+    for kind in FeatureKind:
+        rows.add_argument(
+            f"--{kind.value}",
+            action="append",
+            default=[],
+            metavar="FEATURE",
+            help=f"take this feature as {kind.value}, whatever it looks like; repeatable",
+        )
+    rows.add_argument(
+        "--lags",
+        type=int,
+        default=defaults.lags,
+        metavar="N",
+        help="also learn from what each feature was 1 to N rows before; for evenly spaced rows, "
+        "and then the executor's rate must be theirs (default: %(default)s)",
+    )
+    rows.add_argument(
+        "--upsample",
+        type=Upsampling,
+        choices=list(Upsampling),
+        default=defaults.upsample,
+        metavar=_values(Upsampling),
+        help="make up rows for rare actions, for decision trees to be fitted to and never judged "
+        "on; svm-smote needs the package imbalanced-learn (default: none)",
+    )
+
+
+def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
     learning = parser.add_argument_group("learning (paper, section III)")
     learning.add_argument(
         "--paper",
         action="store_true",
         help="the paper's settings: Algorithm 1 as printed, depth 5, no pruning, last actions and "
         "PSA nodes always, a Parallel root; other options change them",
-    )
-    learning.add_argument(
-        "--delta",
-        type=float,
-        help="actions with at least (1 - DELTA) of a leaf's largest share may stand together in "
-        f"a Parallel/Selector node (PSA); 0 to 1 (default: {defaults.delta})",
     )
     learning.add_argument(
         "--max-depth",
@@ -88,15 +123,18 @@ def _parser() -> argparse.ArgumentParser:
         "tree within one standard error of the best in cross-validation (default: auto)",
     )
     learning.add_argument(
-        "--root", type=Root, choices=list(Root), metavar=_values(Root), help="(default: selector)"
-    )
-    learning.add_argument(
         "--last-action",
         type=Use,
         choices=list(Use),
         metavar=_values(Use),
         help="whether the tree may test the last action taken; auto: only where that raises "
         "own-history agreement in cross-validation (default: auto)",
+    )
+    learning.add_argument(
+        "--delta",
+        type=float,
+        help="actions with at least (1 - DELTA) of a leaf's largest share may stand together in "
+        f"a Parallel/Selector node (PSA); 0 to 1 (default: {defaults.delta})",
     )
     learning.add_argument(
         "--psa",
@@ -106,13 +144,23 @@ def _parser() -> argparse.ArgumentParser:
         help="whether PSA nodes stand in the tree; auto as above (default: auto)",
     )
     learning.add_argument(
+        "--random-state", type=int, default=defaults.random_state, help="default: %(default)s"
+    )
+
+
+def _add_form(parser: argparse.ArgumentParser) -> None:
+    form = parser.add_argument_group("form of the tree")
+    form.add_argument(
+        "--root", type=Root, choices=list(Root), metavar=_values(Root), help="(default: selector)"
+    )
+    form.add_argument(
         "--attach",
         action="append",
         default=[],
         metavar="ID|all",
         help="attach a suggested subtree to the root; repeatable",
     )
-    learning.add_argument(
+    form.add_argument(
         "--psa-as",
         type=PsaChoice,
         choices=list(PsaChoice),
@@ -120,19 +168,23 @@ def _parser() -> argparse.ArgumentParser:
         help="turn all PSA nodes into this (default: leave the choice open)",
     )
     for reduction in fields(Reductions):
-        learning.add_argument(
+        form.add_argument(
             f"--no-{reduction.name.replace('_', '-')}",
             dest=reduction.name,
             action="store_false",
             help=_REDUCTIONS[reduction.name],
         )
-    learning.add_argument(
+    form.add_argument(
         "--no-routines",
         dest="routines",
         action="store_false",
         help="look for no Sequences and Repeaters in rows that share one state",
     )
-    learning.add_argument(
+
+
+def _add_judging(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
+    judging = parser.add_argument_group("judging")
+    judging.add_argument(
         "--test-fraction",
         type=float,
         default=defaults.test_fraction,
@@ -140,38 +192,9 @@ def _parser() -> argparse.ArgumentParser:
         help="share that is held out to judge the tree: of the rows, or of the demonstrations if "
         "there are several (default: %(default)s)",
     )
-    learning.add_argument(
+    judging.add_argument(
         "--refit", action="store_true", help="once judged, learn again from all rows"
     )
-    learning.add_argument(
-        "--random-state", type=int, default=defaults.random_state, help="default: %(default)s"
-    )
-    learning.add_argument(
-        "--lags",
-        type=int,
-        default=defaults.lags,
-        metavar="N",
-        help="also learn from what each feature was 1 to N rows before; for evenly spaced rows, "
-        "and then the executor's rate must be theirs (default: %(default)s)",
-    )
-    learning.add_argument(
-        "--upsample",
-        type=Upsampling,
-        choices=list(Upsampling),
-        default=defaults.upsample,
-        metavar=_values(Upsampling),
-        help="make up rows for rare actions, for decision trees to be fitted to and never judged "
-        "on; svm-smote needs the package imbalanced-learn (default: none)",
-    )
-    for kind in FeatureKind:
-        learning.add_argument(
-            f"--{kind.value}",
-            action="append",
-            default=[],
-            metavar="FEATURE",
-            help=f"take this feature as {kind.value}, whatever it looks like; repeatable",
-        )
-    return parser
 
 
 def _values(kind: type[Enum]) -> str:

@@ -44,6 +44,17 @@ def aligned(cells: Sequence[Sequence[str]]) -> Iterator[str]:
         yield "  ".join((f"{first:<{widths[0]}}", *right)).rstrip()
 
 
+def add_seed(parser: argparse.ArgumentParser) -> None:
+    """Adds the seed of what is made up."""
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="equal numbers give equal files (default: %(default)s)",
+    )
+
+
 def add_input_options(parser: argparse.ArgumentParser) -> None:
     """Adds INPUT... and how to read it."""
     parser.add_argument(

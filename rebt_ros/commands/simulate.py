@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import aligned, run
+from rebt_ros.commands.shell import add_seed, aligned, run
 from rebt_ros.errors import InputError
 from rebt_ros.simulation.experiment_config import ExperimentConfig, parse_config
 from rebt_ros.simulation.experiment_robot import (
@@ -56,13 +56,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N",
         help="ticks of the tree (default: %(default)s)",
     )
-    parser.add_argument(
-        "--seed",
-        type=int,
-        default=0,
-        metavar="N",
-        help="equal numbers give equal files (default: %(default)s)",
-    )
+    add_seed(parser)
     parser.add_argument(
         "--running-chance",
         type=float,

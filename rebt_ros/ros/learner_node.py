@@ -16,20 +16,17 @@ from std_srvs.srv import Trigger
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
-from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
-from rebt_ros.decision_tree.upsampling import Upsampling
-from rebt_ros.demonstration.schema import LARGEST_LAG
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.errors import RebtError
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
+from rebt_ros.ros.learner_settings import declare_settings
 from rebt_ros.ros.learning_process import (
     LearningCancelledError,
     LearningError,
     LearningProcess,
     Progress,
-    Request,
 )
-from rebt_ros.ros.parameters import Parameters
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.tree_file import find_tree
 
@@ -47,8 +44,6 @@ _PUBLISHING: Final = Progress("publishing", 1.0)
 
 #: So many notes are part of the answer; all of them are in the log.
 _NOTES_ANSWERED: Final = 3
-
-_USES: Final = ("auto", "always", "never")
 
 #: How long the end of the node waits for a call that is under way (seconds).
 _LAST_ANSWER: Final = 1.0
@@ -70,7 +65,7 @@ class LearnerNode(Node):
         self._call: _Call | None = None
         self._last = Report(Level.OK, "idle: nothing was learned yet")
         self._learned: LearnedTree | None = None
-        self._declare()
+        self._settings = declare_settings(self)
         self._publisher = self.create_publisher(String, "behavior_tree", TREE_QOS)
         self._publish_what_is_on_disk()
         self._process = LearningProcess()
@@ -96,107 +91,6 @@ class LearnerNode(Node):
         call = self._call
         if call is not None:
             call.over.wait(_LAST_ANSWER)
-
-    def _declare(self) -> None:
-        declare = Parameters(self)
-        self._demonstrations = declare.directory(
-            "demonstrations",
-            "demonstrations",
-            "Directory of the recordings to learn from; ~ is your home.",
-            fixed=False,
-        )
-        self._output = declare.directory(
-            "output", "learned", "Directory that tree.json is written to.", fixed=False
-        )
-        self._timeout = declare.number(
-            "relearn_timeout",
-            0.0,
-            "Learning that takes longer is stopped (seconds); 0.0 for no limit.",
-            0.0,
-            1e6,
-            fixed=False,
-        )
-        self._max_depth = declare.integer(
-            "max_depth", 0, "Splits on the longest path; 0 for no limit.", 0, 100, fixed=False
-        )
-        self._ccp_alpha = declare.number(
-            "ccp_alpha",
-            -1.0,
-            "Complexity parameter of the pruning, 0.0 prunes nothing; -1.0 to choose it by "
-            "cross-validation.",
-            -1.0,
-            1e9,
-            fixed=False,
-        )
-        self._binary = declare.texts(
-            "binary_features",
-            [],
-            "Features to take for binary; others are if they hold nothing but 0 and 1.",
-            fixed=False,
-        )
-        self._categorical = declare.texts(
-            "categorical_features", [], "Features whose numbers are categories.", fixed=False
-        )
-        self._options = {
-            "delta": declare.number(
-                "delta",
-                0.3,
-                "Threshold δ of actions that are close enough to stand in one PSA node.",
-                0.0,
-                1.0,
-                fixed=False,
-            ),
-            "psa": declare.text(
-                "psa",
-                "auto",
-                "Whether PSA nodes stand in the tree; auto: where they do no harm.",
-                choices=_USES,
-                fixed=False,
-            ),
-            "root": declare.text(
-                "root",
-                "selector",
-                "Root node: selector, smaller, or parallel, as in the paper.",
-                choices=[root.value for root in Root],
-                fixed=False,
-            ),
-            "last_action": declare.text(
-                "last_action",
-                "auto",
-                "Whether the tree may test the last action taken; auto: where it does no harm.",
-                choices=_USES,
-                fixed=False,
-            ),
-            "test_fraction": declare.number(
-                "test_fraction", 0.25, "Share to hold out for judging.", 0.0, 0.9, fixed=False
-            ),
-            "refit": declare.flag(
-                "refit", True, "Whether to learn from all rows once it is judged.", fixed=False
-            ),
-            "lags": declare.integer(
-                "lags",
-                0,
-                "How many rows each feature looks back; record with a sample rate for it.",
-                0,
-                LARGEST_LAG,
-                fixed=False,
-            ),
-            "random_state": declare.integer(
-                "random_state",
-                0,
-                "Decides between equally good splits.",
-                0,
-                2**32 - 1,
-                fixed=False,
-            ),
-            "upsample": declare.text(
-                "upsample",
-                "none",
-                "Whether rows are made up for rare actions; svm-smote needs imbalanced-learn.",
-                choices=[upsampling.value for upsampling in Upsampling],
-                fixed=False,
-            ),
-        }
 
     def _relearn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         call = _Call()
@@ -245,21 +139,12 @@ class LearnerNode(Node):
 
     def _learn(self, call: _Call) -> str:
         """Learns, writes and publishes; returns what a person wants to know."""
-        request = Request(
-            str(self._demonstrations()),
-            {
-                "max_depth": self._max_depth() or None,
-                "ccp_alpha": None if self._ccp_alpha() < 0 else self._ccp_alpha(),
-                **{name: read() for name, read in self._options.items()},
-            },
-            self._binary(),
-            self._categorical(),
-        )
-        path = self._output() / _TREE_FILE
+        request = self._settings.request()
+        path = self._settings.output() / _TREE_FILE
         lesson = self._process.ask(
             request,
             cancelled=call.cancelled,
-            limit=self._timeout() or None,
+            limit=self._settings.timeout() or None,
             progress=lambda progress: self._note(call, progress),
         )
         for note in lesson.notes:
@@ -297,7 +182,7 @@ class LearnerNode(Node):
         return response
 
     def _publish_what_is_on_disk(self) -> None:
-        path = self._output() / _TREE_FILE
+        path = self._settings.output() / _TREE_FILE
         try:
             learned = find_tree(path)
         except RebtError as err:

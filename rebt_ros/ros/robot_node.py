@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String
 from std_srvs.srv import Trigger
 
 from rebt_ros.errors import OptionError
@@ -25,6 +26,76 @@ _LARGEST_START: Final = 2**31 - 1
 _REMEMBERED: Final = 1000
 
 
+@dataclass(frozen=True, slots=True)
+class _Settings:
+    """What the robot was started with; times are simulated seconds."""
+
+    command_topics: tuple[str, ...]
+    rate: float
+    """Time steps per simulated second."""
+    speedup: float
+    """Simulated seconds per second, at most."""
+    lockstep: bool
+    """Whether time stands still until a state is answered."""
+    time_limit: float
+    command_timeout: float
+    first_start: Callable[[], int]
+    """Reads what it is set to by now."""
+
+
+def _declare_settings(node: Node) -> _Settings:
+    """Declares and reads the parameters.
+
+    Raises:
+        OptionError: One makes no sense.
+    """
+    declare = Parameters(node)
+    command_topics = declare.texts(
+        "command_topics", ["command", "action"], "String topics to obey; the last word counts."
+    )()
+    if not command_topics:
+        raise OptionError("parameter 'command_topics' is empty: name at least one topic.")
+    return _Settings(
+        command_topics=command_topics,
+        rate=declare.number("rate", 20.0, "Time steps per simulated second (Hz).", 5.0, 200.0)(),
+        speedup=declare.number(
+            "speedup", 1.0, "Simulated seconds per second, at most.", 1.0, 100.0
+        )(),
+        lockstep=declare.flag(
+            "lockstep",
+            False,
+            "Whether time stands still until the latest state is answered by a command, so that a "
+            "busy computer slows the simulation down instead of delaying the commands.",
+        )(),
+        time_limit=declare.number(
+            "time_limit", 60.0, "When a run is lost (simulated seconds).", 1.0, 3600.0
+        )(),
+        command_timeout=declare.number(
+            "command_timeout",
+            0.5,
+            "When the robot stops for want of a command (simulated seconds; not in lockstep).",
+            0.01,
+            60.0,
+        )(),
+        first_start=declare.integer(
+            "first_start",
+            0,
+            "Number of the first run's start, from which the others count on; a new value holds "
+            "from the next reset on.",
+            0,
+            _LARGEST_START,
+            fixed=False,
+        ),
+    )
+
+
+def _layout() -> MultiArrayLayout:
+    """How the values of a state are named."""
+    names = ",".join(State._fields)
+    size = len(State._fields)
+    return MultiArrayLayout(dim=[MultiArrayDimension(label=names, size=size, stride=size)])
+
+
 class RobotNode(Node):
     """Simulates a robot, run after run.
 
@@ -37,75 +108,38 @@ class RobotNode(Node):
 
     def __init__(self) -> None:
         super().__init__("robot")
-        declare = Parameters(self)
-        command_topics = declare.texts(
-            "command_topics", ["command", "action"], "String topics to obey; the last word counts."
-        )()
-        rate = declare.number("rate", 20.0, "Time steps per simulated second (Hz).", 5.0, 200.0)()
-        speedup = declare.number(
-            "speedup", 1.0, "Simulated seconds per second, at most.", 1.0, 100.0
-        )()
-        self._lockstep = declare.flag(
-            "lockstep",
-            False,
-            "Whether time stands still until the latest state is answered by a command, so that a "
-            "busy computer slows the simulation down instead of delaying the commands.",
-        )()
-        time_limit = declare.number(
-            "time_limit", 60.0, "When a run is lost (simulated seconds).", 1.0, 3600.0
-        )()
-        timeout = declare.number(
-            "command_timeout",
-            0.5,
-            "When the robot stops for want of a command (simulated seconds; not in lockstep).",
-            0.01,
-            60.0,
-        )()
-        self._first_start = declare.integer(
-            "first_start",
-            0,
-            "Number of the first run's start, from which the others count on; a new value holds "
-            "from the next reset on.",
-            0,
-            _LARGEST_START,
-            fixed=False,
-        )
-        if not command_topics:
-            raise OptionError("parameter 'command_topics' is empty: name at least one topic.")
-
-        self._time_limit = time_limit
-        self._time_step = 1.0 / rate
+        self._settings = settings = _declare_settings(self)
+        self._time_step = 1.0 / settings.rate
         # While time stands still, the state is repeated at the rate of real time.
-        self._repeat_every = max(round(speedup), 1)
-        self._patience = max(round(timeout * rate), 1)
+        self._repeat_every = max(round(settings.speedup), 1)
+        self._patience = max(round(settings.command_timeout * settings.rate), 1)
         self._new_first_start = False
         self._runs = 0
         self._command: str | None = None
         self._robot = Robot(furnished_room())
-        self._begin(self._first_start())
+        self._layout = _layout()
+        self._begin(settings.first_start())
+        self._open()
+        self.get_logger().info(
+            f"standing at start {self._robot.start}, waiting for a command on "
+            f"{' or '.join(settings.command_topics)}."
+        )
 
-        self._layout = Float64MultiArray().layout
-        self._layout.dim = [
-            MultiArrayDimension(
-                label=",".join(State._fields), size=len(State._fields), stride=len(State._fields)
-            )
-        ]
+    def _open(self) -> None:
+        """Opens everything that publishes or calls back."""
+        settings = self._settings
         self._states = self.create_publisher(Float64MultiArray, "state", 10)
         self._episodes = self.create_publisher(
             String,
             "~/episode",
             QoSProfile(depth=_REMEMBERED, durability=DurabilityPolicy.TRANSIENT_LOCAL),
         )
-        for topic in dict.fromkeys(command_topics):
+        for topic in dict.fromkeys(settings.command_topics):
             # A queue would only make commands late.
             self.create_subscription(String, topic, self._on_command, 1)
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.add_post_set_parameters_callback(self._on_parameters)
-        self.create_timer(1.0 / (rate * speedup), self._on_tick)
-        self.get_logger().info(
-            f"standing at start {self._robot.start}, waiting for a command on "
-            f"{' or '.join(command_topics)}."
-        )
+        self.create_timer(1.0 / (settings.rate * settings.speedup), self._on_tick)
 
     def _on_command(self, message: String) -> None:
         self._command = message.data
@@ -118,7 +152,7 @@ class RobotNode(Node):
 
     def _on_tick(self) -> None:
         self._silence += 1
-        if not self._under_way or (self._lockstep and not self._answered):
+        if not self._under_way or (self._settings.lockstep and not self._answered):
             if self._silence % self._repeat_every == 0:
                 self._publish_state()
             return
@@ -145,14 +179,14 @@ class RobotNode(Node):
     def _begin(self, start: int) -> None:
         """Stands at a start until the next command."""
         self._robot.begin(start)
-        self._episode = Episode(self._robot, self._time_limit, self._time_step)
+        self._episode = Episode(self._robot, self._settings.time_limit, self._time_step)
         self._under_way = False
         self._answered = False
         self._command = None
         self._silence = 0
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        start = self._first_start() if self._new_first_start else self._robot.start + 1
+        start = self._settings.first_start() if self._new_first_start else self._robot.start + 1
         self._new_first_start = False
         self._begin(start)
         response.success = True

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -59,15 +59,8 @@ def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> 
     Raises:
         InputError: The file cannot be read or is not such a table.
     """
-    file = _File(path, read_text(path))
-    records = _records(file)
     notes: list[str] = []
-    if header and _first_is_data(records, labels):
-        header = False
-        notes.append("the first line holds data, so the columns are named x0, x1, and so on")
-    table = _table(file, records, labels, header)
-    if not header:
-        _refuse_header(table)
+    table = _open(path, labels, header, notes)
     labelled = _labelled(table, notes)
     cells = tuple(zip(*(table.rows[row] for row in labelled), strict=True))
     shown = _Shown(table, labelled, cells)
@@ -75,24 +68,15 @@ def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> 
     left_out = _outcomes(table, notes)
     if stamps is not None:
         left_out.add(STAMP)
-    read = [
-        shown.feature(index, notes)
-        for index, name in enumerate(table.columns)
-        if index not in table.labels and name not in left_out
-    ]
-    if not read:
-        raise InputError(
-            f"{path} has no column beside the actions: add one per value of the state, "
-            "separated by commas."
-        )
+    features, columns = _states(shown, left_out, notes)
     taken, label = shown.events()
     actions, chosen = shown.actions(taken, label)
     channels, channel = in_sorted_order(table.channels, label)
     return Read(
         Demonstration(
             path.name,
-            tuple(feature for feature, _ in read),
-            np.column_stack([values for _, values in read])[taken],
+            features,
+            columns[taken],
             (np.array(labelled, dtype=np.int64) if stamps is None else stamps)[taken],
             actions,
             chosen,
@@ -101,6 +85,37 @@ def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> 
         ),
         tuple(notes),
     )
+
+
+def _open(path: Path, labels: Sequence[str], header: bool, notes: list[str]) -> _Table:
+    """The cells of a file, once it is clear whether its first line names the columns."""
+    file = _File(path, read_text(path))
+    records = _records(file)
+    if header and _first_is_data(records, labels):
+        header = False
+        notes.append("the first line holds data, so the columns are named x0, x1, and so on")
+    table = _table(file, records, labels, header)
+    if not header:
+        _refuse_header(table)
+    return table
+
+
+def _states(
+    shown: _Shown, left_out: Set[str], notes: list[str]
+) -> tuple[tuple[Feature, ...], FloatArray]:
+    """The features, and their values in each row (rows x features)."""
+    table = shown.table
+    read = [
+        shown.feature(index, notes)
+        for index, name in enumerate(table.columns)
+        if index not in table.labels and name not in left_out
+    ]
+    if not read:
+        raise InputError(
+            f"{table.file.path} has no column beside the actions: add one per value of the state, "
+            "separated by commas."
+        )
+    return tuple(feature for feature, _ in read), np.column_stack([values for _, values in read])
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,169 @@
+"""The learner's parameters.  All can be set at any time: each call reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from rclpy.node import Node
+
+from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.schema import LARGEST_LAG
+from rebt_ros.ros.learning_process import Request
+from rebt_ros.ros.parameters import Parameters
+
+_USES: Final = ("auto", "always", "never")
+
+
+@dataclass(frozen=True, slots=True)
+class LearnerSettings:
+    """What reads the parameters."""
+
+    demonstrations: Callable[[], Path]
+    output: Callable[[], Path]
+    """Where tree.json is written to."""
+    timeout: Callable[[], float]
+    """How long learning may take, seconds; 0 for no limit."""
+    binary: Callable[[], tuple[str, ...]]
+    categorical: Callable[[], tuple[str, ...]]
+    options: Mapping[str, Callable[[], object]]
+    """By the names that they have in `LearnOptions`."""
+
+    def request(self) -> Request:
+        """What is to be learned from what, and how, as the parameters are now.
+
+        Raises:
+            OptionError: A directory makes no sense.
+        """
+        return Request(
+            str(self.demonstrations()),
+            {name: read() for name, read in self.options.items()},
+            self.binary(),
+            self.categorical(),
+        )
+
+
+def declare_settings(node: Node) -> LearnerSettings:
+    """Declares the parameters.
+
+    Raises:
+        OptionError: One makes no sense.
+    """
+    declare = Parameters(node)
+    return LearnerSettings(
+        demonstrations=declare.directory(
+            "demonstrations",
+            "demonstrations",
+            "Directory of the recordings to learn from; ~ is your home.",
+            fixed=False,
+        ),
+        output=declare.directory(
+            "output", "learned", "Directory that tree.json is written to.", fixed=False
+        ),
+        timeout=declare.number(
+            "relearn_timeout",
+            0.0,
+            "Learning that takes longer is stopped (seconds); 0.0 for no limit.",
+            0.0,
+            1e6,
+            fixed=False,
+        ),
+        binary=declare.texts(
+            "binary_features",
+            [],
+            "Features to take for binary; others are if they hold nothing but 0 and 1.",
+            fixed=False,
+        ),
+        categorical=declare.texts(
+            "categorical_features", [], "Features whose numbers are categories.", fixed=False
+        ),
+        options={**_pruning(declare), **_form(declare), **_rows(declare)},
+    )
+
+
+def _pruning(declare: Parameters) -> dict[str, Callable[[], object]]:
+    """How large the tree becomes."""
+    max_depth = declare.integer(
+        "max_depth", 0, "Splits on the longest path; 0 for no limit.", 0, 100, fixed=False
+    )
+    ccp_alpha = declare.number(
+        "ccp_alpha",
+        -1.0,
+        "Complexity parameter of the pruning, 0.0 prunes nothing; -1.0 to choose it by "
+        "cross-validation.",
+        -1.0,
+        1e9,
+        fixed=False,
+    )
+    return {
+        "max_depth": lambda: max_depth() or None,
+        "ccp_alpha": lambda: None if (alpha := ccp_alpha()) < 0 else alpha,
+    }
+
+
+def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
+    """What stands in the tree."""
+    return {
+        "delta": declare.number(
+            "delta",
+            0.3,
+            "Threshold δ of actions that are close enough to stand in one PSA node.",
+            0.0,
+            1.0,
+            fixed=False,
+        ),
+        "psa": declare.text(
+            "psa",
+            "auto",
+            "Whether PSA nodes stand in the tree; auto: where they do no harm.",
+            choices=_USES,
+            fixed=False,
+        ),
+        "root": declare.text(
+            "root",
+            "selector",
+            "Root node: selector, smaller, or parallel, as in the paper.",
+            choices=[root.value for root in Root],
+            fixed=False,
+        ),
+        "last_action": declare.text(
+            "last_action",
+            "auto",
+            "Whether the tree may test the last action taken; auto: where it does no harm.",
+            choices=_USES,
+            fixed=False,
+        ),
+    }
+
+
+def _rows(declare: Parameters) -> dict[str, Callable[[], object]]:
+    """What rows it is learned from, and judged on."""
+    return {
+        "test_fraction": declare.number(
+            "test_fraction", 0.25, "Share to hold out for judging.", 0.0, 0.9, fixed=False
+        ),
+        "refit": declare.flag(
+            "refit", True, "Whether to learn from all rows once it is judged.", fixed=False
+        ),
+        "lags": declare.integer(
+            "lags",
+            0,
+            "How many rows each feature looks back; record with a sample rate for it.",
+            0,
+            LARGEST_LAG,
+            fixed=False,
+        ),
+        "random_state": declare.integer(
+            "random_state", 0, "Decides between equally good splits.", 0, 2**32 - 1, fixed=False
+        ),
+        "upsample": declare.text(
+            "upsample",
+            "none",
+            "Whether rows are made up for rare actions; svm-smote needs imbalanced-learn.",
+            choices=[upsampling.value for upsampling in Upsampling],
+            fixed=False,
+        ),
+    }
