@@ -18,7 +18,6 @@ from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
-from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.fields import fields_of
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
@@ -27,7 +26,7 @@ from rebt_ros.ros.arrival import ArrivalOrder
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.losses import Losses
-from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.recorder_settings import declare_settings
 from rebt_ros.ros.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
 from rebt_ros.storage.recording import RecordingWriter
 
@@ -36,6 +35,9 @@ _QUEUE: Final = 5000
 
 #: An action that came so long after it was sent may belong to another state (seconds).
 _LATE: Final = 1.0
+
+#: Least time between two fetches (seconds).
+_LEAST_PERIOD: Final = 0.005
 
 #: A state topic is silent after this long without a message (seconds).
 _SILENT: Final = 2.0
@@ -71,118 +73,33 @@ class RecorderNode(Node):
 
     def __init__(self) -> None:
         super().__init__("recorder")
-        declare = Parameters(self)
-        state_topics = declare.texts(
-            "state_topics", ["state"], "Float64MultiArray topics, in the order of their features."
-        )()
-        action_topics = declare.texts(
-            "action_topics", ["action"], "String topics; each is a channel of its own."
-        )()
-        fields = declare.texts(
-            "state_fields",
-            [],
-            "Names of the values of state topics, each entry as in 'state:front,left,right'; "
-            "where a topic has none, its messages' layout labels name them, else their index.",
-        )()
-        commands = declare.text(
-            "command_topic",
-            "command",
-            "String topic of the executor's commands, as a correction knows what they did before "
-            "it (with several action_topics: a topic below it for each); empty for none.",
-        )()
-        driving = declare.text(
-            "driving_topic",
-            "executor/driving",
-            "Bool topic on which the executor says whether it drives: what a person does while it "
-            "drives is a demonstration of its own; empty for none.",
-        )()
-        directory = declare.directory(
-            "demonstrations", "demonstrations", "Directory of the recordings; ~ is your home."
-        )()
-        sample_rate = declare.number(
-            "sample_rate",
-            0.0,
-            "Rows per second while an action holds; 0.0 for one row per action message.",
-            0.0,
-            1000.0,
-        )()
-        start = declare.flag("recording", True, "Whether to record from the start.")()
-        reliability = declare.text(
-            "state_qos",
-            "reliable",
-            "How to subscribe to states: sensor_data also hears best-effort publishers.",
-            choices=("reliable", "sensor_data"),
-        )()
-        window = declare.number(
-            "reorder_window",
-            0.05,
-            "How long to wait for messages that were received earlier (seconds).",
-            0.0,
-            1.0,
-        )()
-
-        sync_period = declare.number(
-            "sync_period",
-            0.0,
-            "How often rows are made to survive a loss of power (seconds); 0.0 for only when a "
-            "demonstration ends.",
-            0.0,
-            3600.0,
-        )()
-
-        def open_writer(features: tuple[Feature, ...]) -> Writer:
-            writer = RecordingWriter(
-                directory, features, action_topics, sample_rate=sample_rate or None
-            )
-            self.get_logger().info(f"recording to {writer.path}.")
-            return writer
-
+        settings = declare_settings(self)
+        self._settings = settings
         self._faults = Faults(self.get_logger())
         self._session = RecordingSession(
-            _state_topics(state_topics, fields),
-            action_topics,
-            sample_rate or None,
-            open_writer,
+            settings.state_topics,
+            settings.action_topics,
+            settings.sample_rate,
+            self._open_writer,
             lambda kind, text: self._faults.note(kind, text, severe=kind == WRITE_ERROR),
         )
-        self._check_names([*state_topics, *action_topics])
-        self._order = ArrivalOrder[Callable[[], object]](round(window * 1e9))
-        self._received = dict.fromkeys(state_topics, 0)
+        self._check_names(settings.sources)
+        self._order = ArrivalOrder[Callable[[], object]](settings.reorder_window)
+        self._received = dict.fromkeys((topic.name for topic in settings.state_topics), 0)
         self._messages = 0
         self._lost = 0
-        self._losses = Losses([*state_topics, *action_topics])
-        self._reliable = [*action_topics, *(state_topics if reliability == "reliable" else ())]
+        self._losses = Losses(settings.sources)
+        self._reliable = settings.action_topics if settings.best_effort else settings.sources
         self._heard: dict[str, float] = {}
         self._reported = time.monotonic()
+        self._immediate = settings.reorder_window == 0
+        self._sources: list[Subscription] = []
+        self._listen_to_demonstrator()
+        self._listen_to_executor()
+        self._begin()
 
-        self._immediate = window == 0.0
-        waking = None if self._immediate else _Fetched()
-        states, actions = QoSProfile(depth=_QUEUE), QoSProfile(depth=_QUEUE)
-        if reliability == "sensor_data":
-            states.reliability = ReliabilityPolicy.BEST_EFFORT
-        self._sources: list[Subscription] = [
-            *(
-                self.create_subscription(
-                    Float64MultiArray,
-                    topic,
-                    partial(self._on_state, topic),
-                    states,
-                    callback_group=waking,
-                )
-                for topic in state_topics
-            ),
-            *(
-                self.create_subscription(
-                    String,
-                    topic,
-                    partial(self._on_action, topic),
-                    actions,
-                    callback_group=waking,
-                )
-                for topic in action_topics
-            ),
-        ]
-        self._listen_to_executor(commands, driving, action_topics)
+    def _begin(self) -> None:
+        """Opens everything else that calls back."""
         # Of their own, because their answers wait for the messages received before.
         group = MutuallyExclusiveCallbackGroup()
         for name, kind, command in (
@@ -191,22 +108,25 @@ class RecorderNode(Node):
             ("~/discard_demonstration", Trigger, lambda _, stamp: self._session.discard(stamp)),
         ):
             self.create_service(kind, name, partial(self._serve, command), callback_group=group)
+        settings = self._settings
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
         if not self._immediate:
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self.create_timer(max(window / 2, 0.005), self._take_ready, clock=steady)
-        if sync_period:
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            period = max(settings.reorder_window / 2e9, _LEAST_PERIOD)
+            self.create_timer(period, self._take_ready, clock=steady)
+        if settings.sync_period:
             self.create_timer(
-                sync_period,
+                settings.sync_period,
                 lambda: self._session.sync(self._stamp(time.time_ns())),
                 clock=steady,
             )
         self._diagnostics = Diagnostics(self, "recording", self._report)
-        if start:
+        if settings.recording:
             self._session.start(self._stamp(time.time_ns()))
         self.get_logger().info(
-            f"{'recording' if start else 'ready to record'} {', '.join(action_topics)} with "
-            f"{', '.join(state_topics)} to {directory.resolve()}."
+            f"{'recording' if settings.recording else 'ready to record'} "
+            f"{', '.join(settings.action_topics)} with "
+            f"{', '.join(topic.name for topic in settings.state_topics)} "
+            f"to {settings.demonstrations.resolve()}."
         )
 
     def close(self) -> None:
@@ -219,8 +139,39 @@ class RecorderNode(Node):
             log = self.get_logger().info if answer.success else self.get_logger().error
             log(answer.message)
 
-    def _listen_to_executor(self, commands: str, driving: str, channels: Sequence[str]) -> None:
+    def _open_writer(self, features: tuple[Feature, ...]) -> Writer:
+        settings = self._settings
+        writer = RecordingWriter(
+            settings.demonstrations,
+            features,
+            settings.action_topics,
+            sample_rate=settings.sample_rate,
+        )
+        self.get_logger().info(f"recording to {writer.path}.")
+        return writer
+
+    def _listen_to_demonstrator(self) -> None:
+        waking = None if self._immediate else _Fetched()
+        states, actions = QoSProfile(depth=_QUEUE), QoSProfile(depth=_QUEUE)
+        if self._settings.best_effort:
+            states.reliability = ReliabilityPolicy.BEST_EFFORT
+        for topic in self._settings.state_topics:
+            take = partial(self._on_state, topic.name)
+            self._sources.append(
+                self.create_subscription(
+                    Float64MultiArray, topic.name, take, states, callback_group=waking
+                )
+            )
+        for channel in self._settings.action_topics:
+            take = partial(self._on_action, channel)
+            self._sources.append(
+                self.create_subscription(String, channel, take, actions, callback_group=waking)
+            )
+
+    def _listen_to_executor(self) -> None:
         """Subscribes to what tells demonstrations and corrections apart."""
+        commands, driving = self._settings.executor.commands, self._settings.executor.driving
+        channels = self._settings.action_topics
         shown = {self.resolve_topic_name(channel) for channel in channels}
         for channel in channels if commands else ():
             topic = topic_of(commands, channel, channels)
@@ -368,25 +319,6 @@ class RecorderNode(Node):
         if silent:
             return Report(Level.WARN, f"no messages on {', '.join(silent)}", values)
         return Report(Level.OK, "recording", values)
-
-
-def _state_topics(names: Sequence[str], fields: Sequence[str]) -> list[StateTopic]:
-    """The state topics, with their fields where an entry "topic:field,field" gives them."""
-    named: dict[str, tuple[str, ...]] = {}
-    for entry in fields:
-        topic, colon, listed = entry.partition(":")
-        parts = tuple(one.strip() for one in listed.split(","))
-        if not colon or not all(parts):
-            raise OptionError(
-                f"parameter 'state_fields' has {entry!r}: write it as 'topic:field,field'."
-            )
-        if topic not in names or topic in named:
-            raise OptionError(
-                f"parameter 'state_fields' names {topic!r}, which state_topics "
-                f"{'does not name' if topic not in names else 'has fields for already'}."
-            )
-        named[topic] = parts
-    return [StateTopic(name, named.get(name, ())) for name in names]
 
 
 def _received(info: dict[str, Any]) -> int:
