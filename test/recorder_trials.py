@@ -9,6 +9,7 @@ import select
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -183,16 +184,35 @@ def load_recorder(
     state_rate: int = 2000,
     action_rate: int = 100,
     width: int = 24,
+    freezes: Sequence[float] = (),
+    parameters: Mapping[str, object] | None = None,
 ) -> Loading:
-    """Lets a recorder record at a high rate, and compares what was sent with what was written."""
+    """Lets a recorder record at a high rate, and compares what was sent with what was written.
+
+    Args:
+        seconds: How long the load lasts.
+        directory: Working directory.
+        state_rate: States per second.
+        action_rate: Actions per second.
+        width: Values of a state.
+        freezes: How long the recorder's process stands still, again and again (seconds).  Where
+            more is sent meanwhile than the transport has room for (512 messages), that drops some.
+        parameters: Of the recorder.
+    """
     with (
         own_domain() as domain,
         Peer(domain) as peer,
-        NodeProcess("recorder_node", domain, directory) as recorder,
+        NodeProcess("recorder_node", domain, directory, parameters) as recorder,
     ):
         recorder.says("recording ")
         memory: list[float] = []
         with Load(domain, state_rate, action_rate, width, seconds) as load:
+            for freeze in freezes:
+                before = _acknowledged(peer)
+                peer.wait_until(lambda before=before: _acknowledged(peer) > before, what="rows")
+                recorder.process.send_signal(signal.SIGSTOP)
+                _pass(peer, freeze)
+                recorder.process.send_signal(signal.SIGCONT)
             last: list[object] = [None]
 
             def ended() -> dict[str, int] | None:
@@ -208,7 +228,7 @@ def load_recorder(
                     int(values_of(peer.diagnostics[RECORDER])["rows"]) >= sent["actions"]
                     and peer.diagnostics[RECORDER] is not last[0]
                 ),
-                10,
+                30,
                 "the last row",
             )
             values = values_of(peer.diagnostics[RECORDER])

@@ -40,6 +40,12 @@ def test_load_loses_no_message_and_no_row(tmp_path: Path) -> None:
     assert result.memory[-1] < result.memory[len(result.memory) // 3] + 20
 
 
+def test_what_the_transport_drops_comes_late_and_finds_its_state(tmp_path: Path) -> None:
+    result = load_recorder(6.0, tmp_path, freezes=(0.7, 0.7))
+    assert (result.rows, result.gaps) == (result.actions, 0), result
+    assert result.misplaced == 0
+
+
 def _limit_files(process: NodeProcess, size: int) -> None:
     """Files can grow no larger: a full disk of the process's own, for which nobody must be root."""
     pid = process.process.pid

@@ -22,12 +22,14 @@ from rebt_ros.demonstration.fields import fields_of
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
 from rebt_ros.ros import lifetime
-from rebt_ros.ros.arrival import ArrivalOrder
+from rebt_ros.ros.arrival import LAST, ArrivalOrder
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.losses import Losses
 from rebt_ros.ros.recorder_settings import declare_settings
 from rebt_ros.ros.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
+from rebt_ros.ros.sending_time import SendingTime, received_at
+from rebt_ros.ros.state_streams import StateStreams
 from rebt_ros.storage.recording import RecordingWriter
 
 #: Long enough that no message of a burst is lost while the disk is slow.
@@ -38,6 +40,9 @@ _LATE: Final = 1.0
 
 #: Least time between two fetches (seconds).
 _LEAST_PERIOD: Final = 0.005
+
+#: Time between two looks at who publishes (seconds).
+_LOOK_PERIOD: Final = 0.5
 
 #: A state topic is silent after this long without a message (seconds).
 _SILENT: Final = 2.0
@@ -64,8 +69,9 @@ class _Fetched(CallbackGroup):
 class RecorderNode(Node):
     """Subscribes to states and actions, and writes one recording per demonstration.
 
-    Messages and service calls take effect in the order in which they were received, whatever the
-    order of their callbacks; so an action is recorded with the state that held when it came.
+    Messages and service calls take effect in the order in which they were sent, or received where
+    the clocks of publishers cannot be compared, whatever the order of their callbacks; so an action
+    is recorded with the state that held then (see `PairBy`).
 
     Raises:
         OptionError: A parameter makes no sense.
@@ -84,7 +90,12 @@ class RecorderNode(Node):
             lambda kind, text: self._faults.note(kind, text, severe=kind == WRITE_ERROR),
         )
         self._check_names(settings.sources)
-        self._order = ArrivalOrder[Callable[[], object]](settings.reorder_window)
+        self._order = ArrivalOrder[Callable[[], object]](
+            settings.reorder_window, settings.state_wait
+        )
+        self._streams = StateStreams(
+            (topic.name for topic in settings.state_topics), settings.state_wait
+        )
         self._received = dict.fromkeys((topic.name for topic in settings.state_topics), 0)
         self._messages = 0
         self._lost = 0
@@ -96,6 +107,8 @@ class RecorderNode(Node):
         self._sources: list[Subscription] = []
         self._listen_to_demonstrator()
         self._listen_to_executor()
+        topics = [source.topic_name for source in self._sources]
+        self._sending = SendingTime(self, topics, settings.pair_by)
         self._begin()
 
     def _begin(self) -> None:
@@ -113,6 +126,7 @@ class RecorderNode(Node):
         if not self._immediate:
             period = max(settings.reorder_window / 2e9, _LEAST_PERIOD)
             self.create_timer(period, self._take_ready, clock=steady)
+        self.create_timer(_LOOK_PERIOD, self._look_at_publishers, clock=steady)
         if settings.sync_period:
             self.create_timer(
                 settings.sync_period,
@@ -132,8 +146,13 @@ class RecorderNode(Node):
     def close(self) -> None:
         """Writes what has been received, and ends the recording."""
         self._take_waiting_messages()
-        for take in self._order.flush():
+        for take in self._order.flush(self._complete(time.monotonic_ns())):
             take()
+        if self._order.held:
+            self.get_logger().warning(
+                f"{self._order.held} actions are left out: the states that they belong to had not "
+                "come when the recorder was stopped."
+            )
         if self._session.recording:
             answer = self._session.stop()
             log = self.get_logger().info if answer.success else self.get_logger().error
@@ -187,14 +206,13 @@ class RecorderNode(Node):
             )
 
     def _on_command(self, channel: str, message: String, info: dict[str, Any]) -> None:
-        received = _received(info)
-        stamp = self._stamp(received)
-        self._queue(received, partial(self._session.command, stamp, channel, message.data))
+        place = self._place(info)
+        stamp = self._stamp(place)
+        self._queue(place, partial(self._session.command, stamp, channel, message.data))
 
     def _on_driving(self, message: Bool, info: dict[str, Any]) -> None:
-        received = _received(info)
-        stamp = self._stamp(received)
-        self._queue(received, partial(self._session.drive, stamp, message.data))
+        place = self._place(info)
+        self._queue(place, partial(self._session.drive, self._stamp(place), message.data))
 
     def _check_names(self, topics: Sequence[str]) -> None:
         for topic in topics:
@@ -209,30 +227,46 @@ class RecorderNode(Node):
     def _on_state(self, topic: str, message: Float64MultiArray, info: dict[str, Any]) -> None:
         self._received[topic] += 1
         self._heard[topic] = time.monotonic()
-        received = self._note(topic, info)
+        self._note(topic, info)
+        sent = self._sending.of(info)
+        if sent is not None:
+            self._streams.take(topic, sent, time.monotonic_ns())
+        place = received_at(info) if sent is None else sent
         labels = fields_of([one.label for one in message.layout.dim], len(message.data))
-        stamp = self._stamp(received)
-        self._queue(received, partial(self._session.observe, stamp, topic, message.data, labels))
+        stamp = self._stamp(place)
+        self._queue(place, partial(self._session.observe, stamp, topic, message.data, labels, sent))
 
     def _on_action(self, topic: str, message: String, info: dict[str, Any]) -> None:
-        received = self._note(topic, info)
+        self._note(topic, info)
+        sent = self._sending.of(info)
+        received = received_at(info)
         late = (received - (info.get("source_timestamp") or received)) / 1e9
-        if late > _LATE:
+        if sent is None and late > _LATE:
             self._faults.note(
                 "late action",
                 f"an action on {topic!r} came {late:.1f} s after it was sent and has the state of "
                 "its arrival: wait until recorder and publisher know each other, and check that "
                 "their clocks agree.",
             )
-        self._queue(
-            received, partial(self._session.act, self._stamp(received), topic, message.data)
-        )
+        place = received if sent is None else sent
+        take = partial(self._session.act, self._stamp(place), topic, message.data, sent)
+        self._queue(place, take, waits=sent is not None)
 
-    def _note(self, topic: str, info: dict[str, Any]) -> int:
-        """Counts a message; returns when it was received, nanoseconds."""
+    def _note(self, topic: str, info: dict[str, Any]) -> None:
+        """Counts a message."""
         self._messages += 1
         self._losses.take(topic, info.get("publication_sequence_number"))
-        return _received(info)
+
+    def _place(self, info: dict[str, Any]) -> int:
+        """Where a message belongs among the others, nanoseconds."""
+        sent = self._sending.of(info)
+        return received_at(info) if sent is None else sent
+
+    def _look_at_publishers(self) -> None:
+        heard = self._sending.look()
+        for topic in self._settings.state_topics:
+            if self.resolve_topic_name(topic.name) in heard:
+                self._streams.announce(topic.name, time.monotonic_ns())
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any
@@ -249,8 +283,8 @@ class RecorderNode(Node):
     def _record(self, request: SetBool.Request, stamp: int) -> Answer:
         return self._session.start(stamp) if request.data else self._session.stop()
 
-    def _queue(self, received: int, take: Callable[[], object]) -> None:
-        self._order.push(received, take, time.monotonic_ns())
+    def _queue(self, place: int, take: Callable[[], object], *, waits: bool = False) -> None:
+        self._order.push(place, take, time.monotonic_ns(), waits=waits)
         if self._immediate:
             self._take_ready()
 
@@ -258,8 +292,12 @@ class RecorderNode(Node):
         now = time.monotonic_ns()
         if not self._immediate:
             self._take_waiting_messages()
-        for take in self._order.ready(now):
+        for take in self._order.ready(now, self._complete(now)):
             take()
+
+    def _complete(self, now: int) -> int:
+        """All states that were sent up to then have come, as far as that matters."""
+        return self._streams.complete(now) if self._sending.comparable else LAST
 
     def _take_waiting_messages(self) -> None:
         """Fetches what was received and still waits for its callback.
@@ -275,11 +313,11 @@ class RecorderNode(Node):
                         break
                     source.callback(*taken)
 
-    def _stamp(self, received: int) -> int:
-        """What a row says: time of reception, or simulated time where that is in use."""
+    def _stamp(self, place: int) -> int:
+        """What a row says: its action's place, or simulated time where that is in use."""
         clock = self.get_clock()
         simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
-        return int(clock.now().nanoseconds) if simulated else received
+        return int(clock.now().nanoseconds) if simulated else place
 
     def _count_losses(self) -> None:
         for topic, count in self._losses.settle(self.count_publishers).items():
@@ -302,6 +340,8 @@ class RecorderNode(Node):
             "takeovers": session.takeovers,
             "messages": self._messages,
             "messages lost": self._lost,
+            "actions that wait for their state": self._order.held,
+            "paired by": "sent" if self._sending.comparable else "received",
             "demonstration": session.writer.path if session.writer else "none yet",
             "rows of the demonstration": session.writer.rows if session.writer else 0,
         }
@@ -319,11 +359,6 @@ class RecorderNode(Node):
         if silent:
             return Report(Level.WARN, f"no messages on {', '.join(silent)}", values)
         return Report(Level.OK, "recording", values)
-
-
-def _received(info: dict[str, Any]) -> int:
-    """When a message was received, nanoseconds; not every middleware says."""
-    return info.get("received_timestamp") or info.get("source_timestamp") or time.time_ns()
 
 
 def main(args: list[str] | None = None) -> None:

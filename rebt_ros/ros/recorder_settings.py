@@ -11,6 +11,7 @@ from rclpy.node import Node
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.errors import OptionError
 from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.sending_time import PairBy
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +39,9 @@ class RecorderSettings:
     """Whether states are subscribed to as sensor data are."""
     reorder_window: int
     """How long messages wait for others that belong before them."""
+    pair_by: PairBy
+    state_wait: int
+    """How long an action waits at most for states that were sent before it."""
     sync_period: float
     """Seconds; 0.0 for only when a demonstration ends."""
 
@@ -79,9 +83,24 @@ def declare_settings(node: Node) -> RecorderSettings:
     window = declare.number(
         "reorder_window",
         0.05,
-        "How long to wait for messages that were received earlier (seconds).",
+        "How long to wait for messages that belong before others (seconds).",
         0.0,
         1.0,
+    )()
+    state_wait = declare.number(
+        "state_wait",
+        10.0,
+        "How long an action waits at most for states that were sent before it, where a stream of "
+        "states has stopped (seconds).",
+        0.0,
+        60.0,
+    )()
+    pair_by = declare.text(
+        "pair_by",
+        PairBy.AUTO.value,
+        "What says which state an action belongs to: when they were sent, when they were "
+        "received, or auto, for when they were sent if all publishers are on this machine.",
+        choices=[one.value for one in PairBy],
     )()
     return RecorderSettings(
         state_topics=_state_topics(names, fields),
@@ -96,6 +115,9 @@ def declare_settings(node: Node) -> RecorderSettings:
         recording=declare.flag("recording", True, "Whether to record from the start.")(),
         best_effort=reliability == "sensor_data",
         reorder_window=round(window * 1e9),
+        # A grid of samples, and taking messages as they come, know of the present only.
+        pair_by=PairBy.RECEIVED if sample_rate or not window else PairBy(pair_by),
+        state_wait=round(state_wait * 1e9),
         sync_period=declare.number(
             "sync_period",
             0.0,

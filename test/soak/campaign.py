@@ -81,16 +81,12 @@ class Soak:
         self._marks: tuple[int, int] | None = None
         """Commands heard and sent when the executor rested last, in the same life."""
         self._disabled_since: float | None = None
-        # What the recorder has said last.
-        self._late = 0
-        self._recorded = Path()
         peer.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_report, 10)
         peer.node.create_subscription(String, "behavior_tree", self._on_tree, LATCHED)
         self._next_watch = 0.0
 
     def begin(self) -> None:
-        """Starts everything."""
-        self.robot.tell("pause")
+        """Starts everything, while the robot moves."""
         for name in _TASKS:
             self.fleet.start(name)
         self.trees = self.peer.connect(String, "behavior_tree", LATCHED)
@@ -98,9 +94,7 @@ class Soak:
         self.actions = self.peer.connect(String, "action")
         for name in _TASKS:
             self.status(name)
-        self.wait(_DISCOVERY)
-        self.robot.tell("resume")
-        self.trees.publish(String(data=self.documents[0]))
+        self.publish_good_tree()
         self.expect_rows()
         self._enable_fresh()
 
@@ -182,10 +176,6 @@ class Soak:
                 path = Path(values["demonstration"]).resolve()
                 if rows:
                     self.ledger.acknowledge(path, rows)
-                late = int(values.get("late action", 0))
-                if late > self._late:
-                    self.ledger.late |= {path, self._recorded}
-                self._late, self._recorded = late, path
             elif status.name == "executor: execution":
                 longest = float(values_of(status)["longest tick (ms)"])
                 self.ledger.raise_to("longest_tick_ms", longest)
@@ -215,6 +205,10 @@ class Soak:
 
     # --- the executor -------------------------------------------------------------------------
 
+    def publish_good_tree(self) -> None:
+        """What an executor that starts later hears from here, where the learner has no tree."""
+        self.trees.publish(String(data=self.documents[0]))
+
     def restart(self, name: str) -> None:
         """Starts a node that has ended; waits until it does its work."""
         if name == "executor":
@@ -224,10 +218,6 @@ class Soak:
             self._marks = None
         if name == "learner":
             self._published.clear()
-        if name == "recorder":
-            # Until recorder and robot know each other the middleware may deliver states seconds
-            # late, and actions that overtake them are recorded with an earlier state.
-            self.robot.tell("pause")
         self.fleet.start(name)
         self.status(name)
         match name:
@@ -236,8 +226,7 @@ class Soak:
             case "learner" if self._tree:
                 self._expect_tree()
             case "recorder":
-                self.wait(_DISCOVERY)
-                self.robot.tell("resume")
+                # The robot has gone on meanwhile.
                 self.expect_rows()
 
     def _enable_fresh(self) -> None:

@@ -95,6 +95,8 @@ def malformed_trees(soak: Soak, random: Random) -> str:
         except DocumentError:
             soak.trees.publish(String(data=text))
             soak.wait(0.02)
+    # A topic keeps the last document only, and an executor that starts later must get a tree.
+    soak.publish_good_tree()
     return f"{_ROW} malformed trees"
 
 
@@ -157,6 +159,16 @@ def full_disk(soak: Soak, random: Random) -> str:
     return "disk that takes nothing"
 
 
+def freeze_recorder(soak: Soak, random: Random) -> str:
+    """Its process stands still until the transport has no room and drops what the robot sends."""
+    pid = soak.fleet.pid("recorder")
+    os.kill(pid, signal.SIGSTOP)
+    soak.wait(random.uniform(1.0, 4.0))
+    os.kill(pid, signal.SIGCONT)
+    soak.expect_rows()
+    return "frozen recorder"
+
+
 def stale_state(soak: Soak, random: Random) -> str:
     """The robot falls silent: the executor waits, and goes on by itself."""
     soak.robot.tell("pause")
@@ -212,6 +224,7 @@ FAULTS: Final[tuple[Callable[[Soak, Random], str], ...]] = (
     malformed_states,
     malformed_actions,
     full_disk,
+    freeze_recorder,
     stale_state,
     disable,
     new_demonstration,
