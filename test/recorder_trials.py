@@ -9,16 +9,21 @@ import select
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from executor_examples import READS_X
 from load_publisher import ACTIONS
 from ros_processes import CHECKOUT, NodeProcess, Peer, own_domain, values_of
+from std_msgs.msg import String
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.storage.recording import is_recording, read_recording
+from rebt_ros.storage.tree_file import write_tree
 
 RECORDER = "recorder: recording"
 
@@ -250,6 +255,116 @@ def load_recorder(
             memory,
             cpu,
         )
+
+
+@dataclass
+class Relearning:
+    """What recorder and executor did while the learner learned, and while it rested."""
+
+    states: int
+    """Sent."""
+    actions: int
+    """Sent."""
+    rows: int
+    misplaced: int
+    """Rows without the state that was sent just before their action."""
+    ticks_without_command: int
+    """By the executor's own count."""
+    commands: int
+    """Heard by another process."""
+    missed: int
+    """Commands that it did not hear, or twice."""
+    resting: list[float]
+    """Times between a tick's command and the next one while nothing was learned (ms)."""
+    learning: list[float]
+    """The same during a relearn."""
+
+
+def relearn_meanwhile(
+    seconds: float, directory: Path, table: Path, state_rate: int = 2000, rate: int = 100
+) -> Relearning:
+    """Lets a recorder record and an executor tick, half of the time during a relearn.
+
+    Args:
+        seconds: How long the load lasts.
+        directory: Working directory.
+        table: A directory of recordings that take longer than that to learn from.
+        state_rate: States per second.
+        rate: Actions, and ticks, per second.
+    """
+    write_tree(directory / "tree.json", READS_X)
+    parameters: dict[str, dict[str, object]] = {
+        "learner": {"demonstrations": table},
+        "recorder": {"command_topic": "", "driving_topic": ""},
+        "executor": {
+            **{"tree_file": directory / "tree.json", "rate": float(rate), "enabled": True},
+            "takeover_topics": ["takeover"],
+        },
+    }
+    sent_at: list[int] = []
+    numbers: list[int] = []
+    phases: list[tuple[int, bool]] = []
+    with own_domain() as domain, Peer(domain) as peer, ExitStack() as stack:
+
+        def start(name: str) -> NodeProcess:
+            return stack.enter_context(
+                NodeProcess(f"{name}_node", domain, directory, parameters[name])
+            )
+
+        recorder = start("recorder")
+        recorder.says("recording ")
+
+        def heard(_: String, info: dict[str, int]) -> None:
+            sent_at.append(info["source_timestamp"])
+            numbers.append(info["publication_sequence_number"])
+
+        peer.node.create_subscription(String, "command", heard, 5000)
+        load = stack.enter_context(Load(domain, state_rate, rate, 24, seconds))
+        # The load begins once the recorder hears it, and must not take another node for that.
+        peer.wait_until(lambda: _acknowledged(peer), what="rows")
+        start("executor")
+        start("learner")
+        peer.wait_until(lambda: len(sent_at) > rate, what="commands")
+        for learning in (False, True, False, True):
+            if learning:
+                call = peer.begin("/learner/relearn")
+                peer.wait_until(lambda: _stage(peer) not in ("idle", ""), what="a relearn")
+            phases.append((time.time_ns(), learning))
+            _pass(peer, seconds / 6)
+            phases.append((time.time_ns(), False))
+            if learning:
+                assert not call.done(), call.result().message
+                peer.call("/learner/cancel")
+        sent = peer.wait_until(load.sent, seconds * 3 + 30, "the end of the load")
+        peer.wait_until(lambda: _acknowledged(peer) >= sent["actions"], 30, "the last row")
+        peer.call("/executor/enable", False)
+        executor = "executor: execution"
+        peer.diagnostics.pop(executor, None)
+        peer.wait_until(lambda: executor in peer.diagnostics, what="a report")
+        counts = values_of(peer.diagnostics[executor])
+        assert recorder.stop() == 0
+    (path,) = (directory / "demonstrations").iterdir()
+    demonstration = read_recording(path).demonstration
+    found: dict[bool, list[float]] = {False: [], True: []}
+    for (begin, learning), (end, _) in zip(phases[::2], phases[1::2], strict=True):
+        within = [one for one in sorted(sent_at) if begin <= one < end]
+        found[learning] += (np.diff(within) / 1e6).tolist()
+    return Relearning(
+        sent["states"],
+        sent["actions"],
+        len(demonstration),
+        misplaced(demonstration, load.every),
+        int(counts["ticks"]) - int(counts["commands"]),
+        len(numbers),
+        abs(numbers[-1] - numbers[0] + 1 - len(numbers)) + len(numbers) - len(set(numbers)),
+        found[False],
+        found[True],
+    )
+
+
+def _stage(peer: Peer) -> str:
+    status = peer.diagnostics.get("learner: learning")
+    return values_of(status).get("stage", "") if status else ""
 
 
 def _pass(peer: Peer, seconds: float) -> None:

@@ -263,10 +263,10 @@ class RecorderNode(Node):
         return received_at(info) if sent is None else sent
 
     def _look_at_publishers(self) -> None:
-        heard = self._sending.look()
+        silent = self._sending.look()
         for topic in self._settings.state_topics:
-            if self.resolve_topic_name(topic.name) in heard:
-                self._streams.announce(topic.name, time.monotonic_ns())
+            if self.resolve_topic_name(topic.name) in silent:
+                self._streams.end(topic.name)
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any

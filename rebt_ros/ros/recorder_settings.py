@@ -89,9 +89,9 @@ def declare_settings(node: Node) -> RecorderSettings:
     )()
     state_wait = declare.number(
         "state_wait",
-        10.0,
-        "How long an action waits at most for states that were sent before it, where a stream of "
-        "states has stopped (seconds).",
+        5.0,
+        "How long an action waits at most for states that were sent before it, where states have "
+        "just stopped to come (seconds).",
         0.0,
         60.0,
     )()

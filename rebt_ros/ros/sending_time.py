@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from enum import Enum
+from itertools import chain
 from typing import Any, Final
 
 from rclpy.node import Node
@@ -58,14 +59,14 @@ class SendingTime:
         """Looks at who publishes; to be called every now and then.
 
         Returns:
-            The topics that have a publisher.
+            The topics that nobody publishes.
         """
         found = {topic: self._node.get_publishers_info_by_topic(topic) for topic in self._topics}
         if self._pair_by is PairBy.AUTO:
-            self.comparable = self._all_here(found.values())
-        return [topic for topic, publishers in found.items() if publishers]
+            self.comparable = self._all_here(chain.from_iterable(found.values()))
+        return [topic for topic, publishers in found.items() if not publishers]
 
-    def _all_here(self, found: Iterable[Sequence[TopicEndpointInfo]]) -> bool:
+    def _all_here(self, publishers: Iterable[TopicEndpointInfo]) -> bool:
         if get_rmw_implementation_identifier() not in _WITH_HOST:
             return False
         name = (self._node.get_name(), self._node.get_namespace())
@@ -75,7 +76,7 @@ class SendingTime:
             if (one.node_name, one.node_namespace) == name
         }
         # A node of this name on another machine would leave it open which one this is.
-        return len(own) == 1 and own.issuperset(_host(one) for some in found for one in some)
+        return len(own) == 1 and own.issuperset(map(_host, publishers))
 
 
 def _host(endpoint: TopicEndpointInfo) -> bytes:

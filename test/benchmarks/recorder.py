@@ -1,7 +1,7 @@
 """What the recorder holds and what it costs, measured: kills, load, CPU per message, reading.
 
     PYTHONPATH=.:test python test/benchmarks/recorder.py [--kills N] [--seconds S] [--rounds N]
-        [--rows N] [--only kills,load,cpu,read]
+        [--rows N] [--only kills,load,freezes,relearn,cpu,read]
 
 Prints a table and writes bench-results/recorder.json.  `pandas.read_csv` is a peer in reading where
 it is installed.
@@ -28,7 +28,13 @@ from statistics import median
 
 import numpy as np
 from load_publisher import ACTIONS
-from recorder_trials import Load, cpu_seconds, kill_recorders, load_recorder
+from recorder_trials import (
+    Load,
+    cpu_seconds,
+    kill_recorders,
+    load_recorder,
+    relearn_meanwhile,
+)
 from ros_processes import NodeProcess, own_domain
 
 from rebt_ros.demonstration.demonstration import Row
@@ -83,6 +89,48 @@ def load(seconds: float, directory: Path) -> list[Figure]:
         figure(f"rows lost in {seconds:g} s of load", result.actions - result.rows, 0, detail),
         figure("messages dropped", sent - result.messages, 0),
         figure("growth of memory (MB)", max(settled) - settled[0], 10),
+    ]
+
+
+def freezes(seconds: float, directory: Path) -> list[Figure]:
+    """The same load, and the recorder stands still for a second again and again."""
+    count = max(1, round(seconds / 10))
+    result = load_recorder(seconds, directory, freezes=[1.0] * count)
+    name = f"while it stood still {count} times for 1 s"
+    detail = f"{result.states} states and {result.actions} actions sent, {result.rows} rows"
+    return [
+        figure(f"rows lost {name}", result.actions - result.rows, 0, detail),
+        figure(f"rows with another state {name}", result.misplaced, 0),
+    ]
+
+
+def relearn(seconds: float, directory: Path) -> list[Figure]:
+    """Recorder and executor at their rates, half of the time during a relearn of many rows."""
+    table = directory / "table"
+    table.mkdir()
+    recording(1_000_000, table)
+    result = relearn_meanwhile(seconds, directory, table)
+
+    def spread(intervals: list[float]) -> str:
+        off = np.abs(np.array(intervals) - 10.0)
+        p50, p99 = np.percentile(off, (50, 99))
+        return f"{p50:.2f} / {p99:.2f} / {off.max():.1f} ms"
+
+    resting, learning = (
+        float(np.percentile(np.abs(np.array(one) - 10.0), 99))
+        for one in (result.resting, result.learning)
+    )
+    detail = (
+        f"off 10 ms, p50 / p99 / max: {spread(result.resting)} of {len(result.resting)} ticks at "
+        f"rest, {spread(result.learning)} of {len(result.learning)} during a relearn"
+    )
+    return [
+        figure(
+            "jitter of ticks during a relearn - at rest (p99, ms)", learning - resting, 5, detail
+        ),
+        figure("rows lost", result.actions - result.rows, 0),
+        figure("rows with another state", result.misplaced, 0),
+        figure("commands missed or doubled", result.ticks_without_command + result.missed, 0),
     ]
 
 
@@ -241,7 +289,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--rows", type=int, default=5_000_000)
-    parser.add_argument("--only", default="kills,load,cpu,read")
+    parser.add_argument("--only", default="kills,load,freezes,relearn,cpu,read")
     parser.add_argument("--memory", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.memory:
@@ -250,6 +298,8 @@ def main() -> int:
     trials: dict[str, Callable[[Path], list[Figure]]] = {
         "kills": lambda directory: kills(options.kills, directory),
         "load": lambda directory: load(options.seconds, directory),
+        "freezes": lambda directory: freezes(options.seconds, directory),
+        "relearn": lambda directory: relearn(options.seconds, directory),
         "cpu": lambda directory: cpu(options.rounds, directory),
         "read": lambda directory: read(options.rows, options.rounds, directory),
     }

@@ -61,7 +61,9 @@ class Soak:
         self.directory = directory
         self.demonstrations = directory / "demonstrations"
         parameters: dict[str, dict[str, object]] = {
-            "recorder": {"demonstrations": self.demonstrations},
+            # What is lost on the way of a busy machine is sent again every three seconds, and may
+            # be lost again.
+            "recorder": {"demonstrations": self.demonstrations, "state_wait": 30.0},
             "learner": {
                 "demonstrations": self.demonstrations,
                 "output": directory / "learned",
