@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray
 from fuzz import corpus
+from recorder_trials import cpu_seconds
 from ros_processes import LATCHED, Peer, own_domain, values_of
 from std_msgs.msg import Float64MultiArray, String
 
@@ -128,6 +129,30 @@ class Soak:
                 self.ledger.lose("hangs", f"waited {_PATIENCE:.0f} s in vain for {what}")
                 return None
             self._meanwhile()
+
+    def expect_relearn(self, call: Any, what: str = "the answer to a relearn") -> None:
+        """Waits for the answer of ~/relearn.
+
+        Learning stands back for all else, and on a busy machine it is slow: it hangs where it has
+        no more of the processor's time for so long, or has had so much of it.
+        """
+        used, since = self._learning_time(), time.monotonic()
+        first = used
+        while not call.done() and time.monotonic() - since < _PATIENCE:
+            self._meanwhile()
+            now = self._learning_time()
+            if now != used and now - first < _PATIENCE:
+                used, since = now, time.monotonic()
+        self.expect(call.done, what)
+
+    def _learning_time(self) -> float:
+        """What the learning process has had of the processor (seconds); 0 if there is none."""
+        status = self.peer.diagnostics.get("learner: learning")
+        pid = values_of(status)["learning process"] if status else ""
+        try:
+            return cpu_seconds(int(pid))
+        except (ValueError, OSError):
+            return 0.0
 
     @contextlib.contextmanager
     def forgiving(self, *errors: type[Exception]) -> Iterator[None]:

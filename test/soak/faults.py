@@ -55,7 +55,7 @@ def kill_learning(soak: Soak, random: Random) -> str:
     if pid.isdecimal():
         with soak.forgiving(ProcessLookupError):
             os.kill(int(pid), signal.SIGKILL)
-    soak.expect(call.done, "the answer to a relearn whose process was killed")
+    soak.expect_relearn(call, "the answer to a relearn whose process was killed")
     soak.note_tree(call)
     return "SIGKILL of the learning process"
 
@@ -64,9 +64,9 @@ def relearn(soak: Soak, random: Random) -> str:
     """Asks to learn; at times twice at once."""
     call = soak.peer.begin("/learner/relearn")
     second = soak.peer.begin("/learner/relearn") if random.random() < 0.5 else None
-    soak.expect(call.done, "the answer to a relearn")
+    soak.expect_relearn(call)
     if second is not None:
-        soak.expect(second.done, "the answer to a second relearn")
+        soak.expect_relearn(second, "the answer to a second relearn")
         soak.note_tree(second)
     soak.note_tree(call)
     return "relearn" if second is None else "relearn, asked for twice"
@@ -79,7 +79,7 @@ def cancel_relearn(soak: Soak, random: Random) -> str:
     names = dict(soak.peer.node.get_service_names_and_types())
     if "/learner/cancel" in names:
         soak.expect(soak.peer.begin("/learner/cancel").done, "the answer to a cancel")
-    soak.expect(call.done, "the answer to a relearn that was cancelled")
+    soak.expect_relearn(call, "the answer to a relearn that was cancelled")
     soak.note_tree(call)
     return "cancel of a relearn" if "/learner/cancel" in names else "relearn"
 
