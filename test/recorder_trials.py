@@ -21,11 +21,16 @@ from load_publisher import ACTIONS
 from ros_processes import CHECKOUT, NodeProcess, Peer, own_domain, values_of
 from std_msgs.msg import String
 
-from rebt_ros.demonstration.demonstration import Demonstration
-from rebt_ros.storage.recording import is_recording, read_recording
+from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.storage.recording import RecordingWriter, is_recording, read_recording
+from rebt_ros.storage.recording_rows import record_type
 from rebt_ros.storage.tree_file import write_tree
 
 RECORDER = "recorder: recording"
+
+#: Values of a state.
+WIDTH = 24
 
 
 class Load:
@@ -37,13 +42,20 @@ class Load:
         action_rate: Actions per second.
         width: Values of a state.
         seconds: How long it publishes; 0 for until it is stopped.
+        subscribers: How many the states must have before it begins.
     """
 
     def __init__(
-        self, domain: int, state_rate: int, action_rate: int, width: int, seconds: float = 0
+        self,
+        domain: int,
+        state_rate: int,
+        action_rate: int,
+        width: int,
+        seconds: float = 0,
+        subscribers: int = 1,
     ) -> None:
         self.every = state_rate // action_rate
-        numbers = map(str, (state_rate, action_rate, width, seconds))
+        numbers = map(str, (state_rate, action_rate, width, seconds, subscribers))
         self.process = subprocess.Popen(
             [sys.executable, str(CHECKOUT / "test" / "load_publisher.py"), *numbers],
             env=dict(
@@ -257,6 +269,23 @@ def load_recorder(
         )
 
 
+def large_recording(rows: int, directory: Path) -> Path:
+    """A recording of many rows, made of copies of some; its actions have no rule."""
+    features = tuple(Feature(f"f{index}", topic="state", index=index) for index in range(WIDTH))
+    block = min(rows, 10_000)
+    states = np.random.default_rng(0).normal(size=(block, WIDTH))
+    with RecordingWriter(directory, features, ["action"]) as writer:
+        for number, state in enumerate(states.tolist()):
+            action = ACTIONS[number * 7 % len(ACTIONS)]
+            writer.write(Row(number * 10**7, "action", action, None, tuple(state)))
+    # The later half of the rows, before which all labels were introduced.
+    content = writer.path.read_bytes()[-(block // 2) * record_type(WIDTH).itemsize :]
+    with writer.path.open("ab") as file:
+        for _ in range((rows - block) // (block // 2)):
+            file.write(content)
+    return writer.path
+
+
 @dataclass
 class Relearning:
     """What recorder and executor did while the learner learned, and while it rested."""
@@ -319,11 +348,11 @@ def relearn_meanwhile(
             numbers.append(info["publication_sequence_number"])
 
         peer.node.create_subscription(String, "command", heard, 5000)
-        load = stack.enter_context(Load(domain, state_rate, rate, 24, seconds))
-        # The load begins once the recorder hears it, and must not take another node for that.
-        peer.wait_until(lambda: _acknowledged(peer), what="rows")
         start("executor")
         start("learner")
+        peer.wait_until(lambda: _stage(peer) == "idle", what="the learner")
+        # Recorder and executor.
+        load = stack.enter_context(Load(domain, state_rate, rate, WIDTH, seconds, 2))
         peer.wait_until(lambda: len(sent_at) > rate, what="commands")
         for learning in (False, True, False, True):
             if learning:

@@ -27,24 +27,22 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from load_publisher import ACTIONS
 from recorder_trials import (
+    WIDTH,
     Load,
     cpu_seconds,
     kill_recorders,
+    large_recording,
     load_recorder,
     relearn_meanwhile,
 )
 from ros_processes import NodeProcess, own_domain
 
-from rebt_ros.demonstration.demonstration import Row
-from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import tabulate
-from rebt_ros.storage.recording import RecordingWriter, read_recording
+from rebt_ros.storage.recording import read_recording
 from rebt_ros.storage.recording_rows import LABEL, record_type
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-WIDTH = 24
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ def relearn(seconds: float, directory: Path) -> list[Figure]:
     """Recorder and executor at their rates, half of the time during a relearn of many rows."""
     table = directory / "table"
     table.mkdir()
-    recording(1_000_000, table)
+    large_recording(1_000_000, table)
     result = relearn_meanwhile(seconds, directory, table)
 
     def spread(intervals: list[float]) -> str:
@@ -183,7 +181,7 @@ def _subject(subject: str, domain: int, directory: Path) -> Iterator[subprocess.
 
 def read(rows: int, rounds: int, directory: Path) -> list[Figure]:
     """Reading a recording, against numpy alone, and pandas reading the same table as CSV."""
-    small = recording(min(rows, 1_000_000), directory)
+    small = large_recording(min(rows, 1_000_000), directory)
     peers: dict[str, Callable[[], object]] = {
         "read_recording": lambda: read_recording(small),
         "numpy": lambda: _numpy_alone(small),
@@ -208,7 +206,7 @@ def read(rows: int, rounds: int, directory: Path) -> list[Figure]:
     figures = [figure("reading / numpy alone", ours / median(measured["numpy"]), 1.2, detail)]
     if "pandas" in measured:
         figures.append(figure("reading / pandas.read_csv", ours / median(measured["pandas"]), 1.2))
-    large = recording(rows, directory)
+    large = large_recording(rows, directory)
     seconds, reading, joining = _peak_memory(large)
     detail = f"{rows} rows x {WIDTH} in {seconds:.1f} s"
     return [
@@ -216,23 +214,6 @@ def read(rows: int, rounds: int, directory: Path) -> list[Figure]:
         figure("peak memory of reading / table", reading, 4, detail),
         figure("peak memory of reading and tabulating / table", joining, 4),
     ]
-
-
-def recording(rows: int, directory: Path) -> Path:
-    """A recording of many rows, made of copies of some."""
-    features = tuple(Feature(f"f{index}", topic="state", index=index) for index in range(WIDTH))
-    block = min(rows, 10_000)
-    states = np.random.default_rng(0).normal(size=(block, WIDTH))
-    with RecordingWriter(directory, features, ["action"]) as writer:
-        for number, state in enumerate(states.tolist()):
-            action = ACTIONS[number * 7 % len(ACTIONS)]
-            writer.write(Row(number * 10**7, "action", action, None, tuple(state)))
-    # The later half of the rows, before which all labels were introduced.
-    content = writer.path.read_bytes()[-(block // 2) * record_type(WIDTH).itemsize :]
-    with writer.path.open("ab") as file:
-        for _ in range((rows - block) // (block // 2)):
-            file.write(content)
-    return writer.path
 
 
 def as_csv(path: Path, rows: int) -> Path:
