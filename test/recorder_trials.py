@@ -303,6 +303,8 @@ class Relearning:
     """Heard by another process."""
     missed: int
     """Commands that it did not hear, or twice."""
+    lost_messages: int
+    """States and actions that the recorder never got, by its own count."""
     resting: list[float]
     """Times between a tick's command and the next one while nothing was learned (ms)."""
     learning: list[float]
@@ -366,6 +368,7 @@ def relearn_meanwhile(
                 peer.call("/learner/cancel")
         sent = peer.wait_until(load.sent, seconds * 3 + 30, "the end of the load")
         peer.wait_until(lambda: _acknowledged(peer) >= sent["actions"], 30, "the last row")
+        lost = int(values_of(peer.diagnostics[RECORDER])["messages lost"])
         peer.call("/executor/enable", False)
         executor = "executor: execution"
         peer.diagnostics.pop(executor, None)
@@ -386,6 +389,7 @@ def relearn_meanwhile(
         int(counts["ticks"]) - int(counts["commands"]),
         len(numbers),
         abs(numbers[-1] - numbers[0] + 1 - len(numbers)) + len(numbers) - len(set(numbers)),
+        lost,
         found[False],
         found[True],
     )

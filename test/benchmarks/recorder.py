@@ -91,11 +91,17 @@ def load(seconds: float, directory: Path) -> list[Figure]:
 
 
 def freezes(seconds: float, directory: Path) -> list[Figure]:
-    """The same load, and the recorder stands still for a second again and again."""
+    """1 kHz states, and the recorder stands still again and again.
+
+    What the transport drops is sent again after 3 s; the publisher keeps its last 5000 messages.
+    """
     count = max(1, round(seconds / 10))
-    result = load_recorder(seconds, directory, freezes=[1.0] * count)
-    name = f"while it stood still {count} times for 1 s"
-    detail = f"{result.states} states and {result.actions} actions sent, {result.rows} rows"
+    result = load_recorder(seconds, directory, state_rate=1000, freezes=[0.7] * count)
+    name = f"while it stood still {count} times for 0.7 s"
+    detail = (
+        f"{result.states} states and {result.actions} actions sent, {result.rows} rows, "
+        f"{result.lost_messages} messages lost"
+    )
     return [
         figure(f"rows lost {name}", result.actions - result.rows, 0, detail),
         figure(f"rows with another state {name}", result.misplaced, 0),
@@ -120,7 +126,8 @@ def relearn(seconds: float, directory: Path) -> list[Figure]:
     )
     detail = (
         f"off 10 ms, p50 / p99 / max: {spread(result.resting)} of {len(result.resting)} ticks at "
-        f"rest, {spread(result.learning)} of {len(result.learning)} during a relearn"
+        f"rest, {spread(result.learning)} of {len(result.learning)} during a relearn; "
+        f"{result.lost_messages} messages lost by the recorder"
     )
     return [
         figure(
