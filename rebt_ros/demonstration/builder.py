@@ -208,12 +208,14 @@ class DemonstrationBuilder:
         for topic in self._fields:
             recent = self._recent.get(topic)
             known = self._latest.get(topic)
+            came = "came before the first message"
             if known is not None and sent is not None and recent is not None:
                 known = recent.at(sent)
+                came = "was sent before the first message that is known"
             if known is None:
                 raise BadMessageError(
                     Fault.NO_STATE,
-                    f"action {label!r} came before the first message on state topic {topic!r}: "
+                    f"action {label!r} {came} on state topic {topic!r}: "
                     "it is left out, because the state it belongs to is not known.",
                 )
             states.append(known)

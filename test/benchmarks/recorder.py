@@ -109,7 +109,7 @@ def freezes(seconds: float, directory: Path) -> list[Figure]:
 
 
 def relearn(seconds: float, directory: Path) -> list[Figure]:
-    """Recorder and executor at their rates, half of the time during a relearn of many rows."""
+    """1 kHz states, 100 Hz actions and ticks, half of the time during a relearn of many rows."""
     table = directory / "table"
     table.mkdir()
     large_recording(1_000_000, table)
