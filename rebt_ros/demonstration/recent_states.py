@@ -7,8 +7,8 @@ from bisect import bisect_right
 from collections.abc import Sequence
 
 #: So many states are kept of a topic, or fewer that have so many values together.
-_STATES = 40_000
-_VALUES = 1_000_000
+_STATES = 20_000
+_VALUES = 500_000
 
 #: A state that was sent so long before the newest one tells of a clock that was set back (ns).
 _SET_BACK = 60_000_000_000
