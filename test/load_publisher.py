@@ -1,10 +1,10 @@
 """A robot that is demonstrated at a fixed rate, as a process: states that count, and actions.
 
-    python load_publisher.py STATE_RATE ACTION_RATE WIDTH SECONDS
+    python load_publisher.py STATE_RATE ACTION_RATE WIDTH SECONDS SUBSCRIBERS
 
 State n is [n, 0.5, 0.5, ...].  Every (STATE_RATE / ACTION_RATE)th state is followed by an action.
-It begins once both topics have a subscriber, and ends after so many seconds, or never after 0; then
-it prints how many states and actions it sent.
+It begins once the states have so many subscribers and the actions have one, and ends after so many
+seconds, or never after 0; then it prints how many states and actions it sent.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ ACTIONS = ("go", "turn left", "turn right", "stop")
 
 
 def main() -> None:
-    state_rate, action_rate, width, seconds = map(float, sys.argv[1:])
+    state_rate, action_rate, width, seconds, subscribers = map(float, sys.argv[1:])
     every = round(state_rate / action_rate)
     rclpy.init()
     node = rclpy.create_node("load_publisher")
     states = node.create_publisher(Float64MultiArray, "state", QoSProfile(depth=5000))
     actions = node.create_publisher(String, "action", QoSProfile(depth=5000))
-    while not (states.get_subscription_count() and actions.get_subscription_count()):
+    while states.get_subscription_count() < subscribers or not actions.get_subscription_count():
         time.sleep(0.02)
     message = Float64MultiArray(data=[0.5] * round(width))
     sent = [0, 0]

@@ -9,17 +9,28 @@ import select
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from executor_examples import READS_X
 from load_publisher import ACTIONS
 from ros_processes import CHECKOUT, PATIENCE, NodeProcess, Peer, own_domain, values_of
+from std_msgs.msg import String
 
-from rebt_ros.demonstration.demonstration import Demonstration
-from rebt_ros.storage.recording import is_recording, read_recording
+from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.storage.recording import RecordingWriter, is_recording, read_recording
+from rebt_ros.storage.recording_rows import record_type
+from rebt_ros.storage.tree_file import write_tree
 
 RECORDER = "recorder: recording"
+
+#: Values of a state.
+WIDTH = 24
 
 
 class Load:
@@ -31,13 +42,20 @@ class Load:
         action_rate: Actions per second.
         width: Values of a state.
         seconds: How long it publishes; 0 for until it is stopped.
+        subscribers: How many the states must have before it begins.
     """
 
     def __init__(
-        self, domain: int, state_rate: int, action_rate: int, width: int, seconds: float = 0
+        self,
+        domain: int,
+        state_rate: int,
+        action_rate: int,
+        width: int,
+        seconds: float = 0,
+        subscribers: int = 1,
     ) -> None:
         self.every = state_rate // action_rate
-        numbers = map(str, (state_rate, action_rate, width, seconds))
+        numbers = map(str, (state_rate, action_rate, width, seconds, subscribers))
         self.process = subprocess.Popen(
             [sys.executable, str(CHECKOUT / "test" / "load_publisher.py"), *numbers],
             env=dict(
@@ -183,16 +201,35 @@ def load_recorder(
     state_rate: int = 2000,
     action_rate: int = 100,
     width: int = 24,
+    freezes: Sequence[float] = (),
+    parameters: Mapping[str, object] | None = None,
 ) -> Loading:
-    """Lets a recorder record at a high rate, and compares what was sent with what was written."""
+    """Lets a recorder record at a high rate, and compares what was sent with what was written.
+
+    Args:
+        seconds: How long the load lasts.
+        directory: Working directory.
+        state_rate: States per second.
+        action_rate: Actions per second.
+        width: Values of a state.
+        freezes: How long the recorder's process stands still, again and again (seconds).  Where
+            more is sent meanwhile than the transport has room for (512 messages), that drops some.
+        parameters: Of the recorder.
+    """
     with (
         own_domain() as domain,
         Peer(domain) as peer,
-        NodeProcess("recorder_node", domain, directory) as recorder,
+        NodeProcess("recorder_node", domain, directory, parameters) as recorder,
     ):
         recorder.says("recording ")
         memory: list[float] = []
         with Load(domain, state_rate, action_rate, width, seconds) as load:
+            for freeze in freezes:
+                before = _acknowledged(peer)
+                peer.wait_until(lambda before=before: _acknowledged(peer) > before, what="rows")
+                recorder.process.send_signal(signal.SIGSTOP)
+                _pass(peer, freeze)
+                recorder.process.send_signal(signal.SIGCONT)
             last: list[object] = [None]
 
             def ended() -> dict[str, int] | None:
@@ -230,6 +267,139 @@ def load_recorder(
             memory,
             cpu,
         )
+
+
+def large_recording(rows: int, directory: Path) -> Path:
+    """A recording of many rows, made of copies of some; its actions have no rule."""
+    features = tuple(Feature(f"f{index}", topic="state", index=index) for index in range(WIDTH))
+    block = min(rows, 10_000)
+    states = np.random.default_rng(0).normal(size=(block, WIDTH))
+    with RecordingWriter(directory, features, ["action"]) as writer:
+        for number, state in enumerate(states.tolist()):
+            action = ACTIONS[number * 7 % len(ACTIONS)]
+            writer.write(Row(number * 10**7, "action", action, None, tuple(state)))
+    # The later half of the rows, before which all labels were introduced.
+    content = writer.path.read_bytes()[-(block // 2) * record_type(WIDTH).itemsize :]
+    with writer.path.open("ab") as file:
+        for _ in range((rows - block) // (block // 2)):
+            file.write(content)
+    return writer.path
+
+
+@dataclass
+class Relearning:
+    """What recorder and executor did while the learner learned, and while it rested."""
+
+    states: int
+    """Sent."""
+    actions: int
+    """Sent."""
+    rows: int
+    misplaced: int
+    """Rows without the state that was sent just before their action."""
+    ticks_without_command: int
+    """By the executor's own count."""
+    commands: int
+    """Heard by another process."""
+    missed: int
+    """Commands that it did not hear, or twice."""
+    lost_messages: int
+    """States and actions that the recorder never got, by its own count."""
+    resting: list[float]
+    """Times between a tick's command and the next one while nothing was learned (ms)."""
+    learning: list[float]
+    """The same during a relearn."""
+
+
+def relearn_meanwhile(
+    seconds: float, directory: Path, table: Path, state_rate: int = 1000, rate: int = 100
+) -> Relearning:
+    """Lets a recorder record and an executor tick, half of the time during a relearn.
+
+    Args:
+        seconds: How long the load lasts.
+        directory: Working directory.
+        table: A directory of recordings that take longer than that to learn from.
+        state_rate: States per second.
+        rate: Actions, and ticks, per second.
+    """
+    write_tree(directory / "tree.json", READS_X)
+    parameters: dict[str, dict[str, object]] = {
+        "learner": {"demonstrations": table},
+        "recorder": {"command_topic": "", "driving_topic": ""},
+        "executor": {
+            **{"tree_file": directory / "tree.json", "rate": float(rate), "enabled": True},
+            "takeover_topics": ["takeover"],
+        },
+    }
+    sent_at: list[int] = []
+    numbers: list[int] = []
+    phases: list[tuple[int, bool]] = []
+    with own_domain() as domain, Peer(domain) as peer, ExitStack() as stack:
+
+        def start(name: str) -> NodeProcess:
+            return stack.enter_context(
+                NodeProcess(f"{name}_node", domain, directory, parameters[name])
+            )
+
+        recorder = start("recorder")
+        recorder.says("recording ")
+
+        def heard(_: String, info: dict[str, int]) -> None:
+            sent_at.append(info["source_timestamp"])
+            numbers.append(info["publication_sequence_number"])
+
+        peer.node.create_subscription(String, "command", heard, 5000)
+        start("executor")
+        start("learner")
+        peer.wait_until(lambda: _stage(peer) == "idle", what="the learner")
+        # Recorder and executor.
+        load = stack.enter_context(Load(domain, state_rate, rate, WIDTH, seconds, 2))
+        peer.wait_until(lambda: len(sent_at) > rate, what="commands")
+        for learning in (False, True, False, True):
+            if learning:
+                call = peer.begin("/learner/relearn")
+                peer.wait_until(lambda: _stage(peer) not in ("idle", ""), what="a relearn")
+            phases.append((time.time_ns(), learning))
+            _pass(peer, seconds / 6)
+            phases.append((time.time_ns(), False))
+            if learning:
+                assert not call.done(), call.result().message
+                peer.call("/learner/cancel")
+        sent = peer.wait_until(load.sent, seconds * 3 + 30, "the end of the load")
+        # Rows that never come are a figure.
+        with suppress(TimeoutError):
+            peer.wait_until(lambda: _acknowledged(peer) >= sent["actions"], 30)
+        lost = int(values_of(peer.diagnostics[RECORDER])["messages lost"])
+        peer.call("/executor/enable", False)
+        executor = "executor: execution"
+        peer.diagnostics.pop(executor, None)
+        peer.wait_until(lambda: executor in peer.diagnostics, what="a report")
+        counts = values_of(peer.diagnostics[executor])
+        assert recorder.stop() == 0
+    (path,) = (directory / "demonstrations").iterdir()
+    demonstration = read_recording(path).demonstration
+    found: dict[bool, list[float]] = {False: [], True: []}
+    for (begin, learning), (end, _) in zip(phases[::2], phases[1::2], strict=True):
+        within = [one for one in sorted(sent_at) if begin <= one < end]
+        found[learning] += (np.diff(within) / 1e6).tolist()
+    return Relearning(
+        sent["states"],
+        sent["actions"],
+        len(demonstration),
+        misplaced(demonstration, load.every),
+        int(counts["ticks"]) - int(counts["commands"]),
+        len(numbers),
+        abs(numbers[-1] - numbers[0] + 1 - len(numbers)) + len(numbers) - len(set(numbers)),
+        lost,
+        found[False],
+        found[True],
+    )
+
+
+def _stage(peer: Peer) -> str:
+    status = peer.diagnostics.get("learner: learning")
+    return values_of(status).get("stage", "") if status else ""
 
 
 def _pass(peer: Peer, seconds: float) -> None:

@@ -32,6 +32,43 @@ def test_an_item_takes_along_what_was_received_before_it() -> None:
     assert order.flush() == []
 
 
+def test_what_waits_holds_up_what_follows_it_until_all_before_it_has_come() -> None:
+    order = ArrivalOrder[str](window=5, patience=100)
+    order.push(20, "action", now=0, waits=True)
+    order.push(30, "service", now=0)
+    assert order.ready(now=50, complete=10) == []
+    assert order.held == 1
+    order.push(15, "late state", now=51)
+    assert order.ready(now=56, complete=15) == ["late state"]
+    assert order.ready(now=57, complete=20) == ["action", "service"]
+    assert order.held == 0
+
+
+def test_nothing_is_held_up_for_longer_than_the_patience() -> None:
+    order = ArrivalOrder[str](window=5, patience=100)
+    order.push(20, "action", now=0, waits=True)
+    assert order.ready(now=99, complete=10) == []
+    assert order.ready(now=100, complete=10) == ["action"]
+
+
+def test_the_end_leaves_what_still_needs_others() -> None:
+    order = ArrivalOrder[str](window=5, patience=100)
+    order.push(10, "state", now=0)
+    order.push(20, "action", now=0, waits=True)
+    order.push(30, "action", now=0, waits=True)
+    assert order.flush(complete=20) == ["state", "action"]
+    assert order.held == 1
+
+
+def test_stamps_that_begin_anew_wait_for_their_window_again() -> None:
+    order = ArrivalOrder[str](window=5)
+    order.push(1000, "before", now=0)
+    assert order.ready(now=5) == ["before"]
+    order.push(7, "set back", now=6)
+    assert order.ready(now=10) == []
+    assert order.ready(now=11) == ["set back"]
+
+
 @given(st.lists(st.tuples(st.integers(0, 20), st.integers(0, 5))), st.integers(0, 10))
 def test_nothing_is_lost_and_nothing_waits_longer_than_the_window(
     pushes: list[tuple[int, int]], window: int

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from itertools import pairwise
 
@@ -510,3 +511,58 @@ def test_options_that_make_no_sense_are_refused(
 def test_field_names_of_a_topic_must_differ() -> None:
     with pytest.raises(OptionError, match="'state' must differ"):
         StateTopic("state", ("x", "x"))
+
+
+#: When a message was sent, its kind, and how much later it comes than it was sent.
+MESSAGES = st.lists(
+    st.tuples(st.sampled_from(["pose", "power", "action"]), st.integers(0, 30)),
+    max_size=40,
+)
+
+
+@given(MESSAGES)
+def test_messages_that_come_late_make_the_rows_of_the_order_in_which_they_were_sent(
+    messages: list[tuple[str, int]],
+) -> None:
+    """As from a bag, in which they stand in that order; all states have come before an action."""
+
+    def rows_of(order: list[int], told: bool) -> list[Row]:
+        builder = DemonstrationBuilder([StateTopic("pose"), StateTopic("power")], ["action"])
+        rows: list[Row] = []
+        for sent in order:
+            topic = messages[sent][0]
+            when = sent if told else None
+            with contextlib.suppress(BadMessageError):
+                if topic == "action":
+                    rows += builder.act(sent, topic, "ab"[sent % 2], when)
+                else:
+                    rows += builder.observe(sent, topic, [float(sent)], (), when)
+        return rows
+
+    sent = list(range(len(messages)))
+    # Actions keep their order, as those of one publisher do, and none overtakes a state.
+    states = [one for one in sent if messages[one][0] != "action"]
+    arrival = {one: one + messages[one][1] for one in states}
+    latest = 0
+    for one in sent:
+        if messages[one][0] == "action":
+            before = [arrival[state] for state in states if state < one]
+            latest = max([latest, one + messages[one][1], *before])
+            arrival[one] = latest
+    came = sorted(sent, key=lambda one: (arrival[one], one))
+    assert rows_of(came, told=True) == rows_of(sent, told=False)
+
+
+def test_an_action_from_before_all_states_that_are_known_is_left_out() -> None:
+    builder = one_topic()
+    builder.observe(10, "state", [1.0], sent=10)
+    with pytest.raises(BadMessageError) as caught:
+        builder.act(11, "action", "go", sent=9)
+    assert caught.value.fault is Fault.NO_STATE
+
+
+def test_states_whose_sending_is_not_known_are_paired_by_arrival() -> None:
+    builder = one_topic()
+    builder.observe(10, "state", [1.0], sent=10)
+    builder.observe(11, "state", [2.0])
+    assert builder.act(12, "action", "go", sent=10)[0].state == (2.0,)

@@ -102,7 +102,7 @@ def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
         "halt_action": "wait" if novelty == "hold" else "",
     }
     with (
-        NodeProcess("recorder_node", domain, tmp_path),
+        NodeProcess("recorder_node", domain, tmp_path, {"state_wait": 0.2}),
         NodeProcess("learner_node", domain, tmp_path, PARAMETERS),
         NodeProcess("executor_node", domain, tmp_path, executing),
     ):

@@ -402,6 +402,11 @@ def test_the_learning_process_stands_back_for_the_nodes(
         wait_until(lambda: sacrificed(child) > sacrificed(node))
         nicer = os.getpriority(os.PRIO_PROCESS, child) - os.getpriority(os.PRIO_PROCESS, node)
         assert nicer > 0
+        # Where there are such groups, the processor is shared out among sessions before all else.
+        session = Path(f"/proc/{child}/autogroup")
+        if session.exists() and Path("/proc/sys/kernel/sched_autogroup_enabled").exists():
+            assert os.getsid(child) != os.getsid(node)
+            assert int(session.read_text().split()[-1]) > 0
 
 
 def test_a_tree_that_cannot_be_written_is_not_published(

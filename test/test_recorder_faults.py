@@ -14,7 +14,13 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from recorder_trials import RECORDER, kill_recorders, load_recorder
+from recorder_trials import (
+    RECORDER,
+    kill_recorders,
+    large_recording,
+    load_recorder,
+    relearn_meanwhile,
+)
 from ros_processes import NodeProcess, Peer, values_of
 
 from rebt_ros.storage.recording import read_recording, recordings
@@ -43,6 +49,22 @@ def test_load_loses_no_message_and_no_row(tmp_path: Path) -> None:
     assert result.rows == result.actions
     assert (result.gaps, result.lost_messages, result.faults) == (0, 0, [])
     assert result.memory[-1] < result.memory[len(result.memory) // 3] + 20
+
+
+def test_what_the_transport_drops_comes_late_and_finds_its_state(tmp_path: Path) -> None:
+    result = load_recorder(6.0, tmp_path, freezes=(0.7, 0.7))
+    assert (result.rows, result.gaps) == (result.actions, 0), result
+    assert result.misplaced == 0
+
+
+def test_a_relearn_costs_no_row_and_no_command(tmp_path: Path) -> None:
+    table = tmp_path / "table"
+    table.mkdir()
+    large_recording(100_000, table)
+    result = relearn_meanwhile(6.0, tmp_path, table, state_rate=500, rate=50)
+    assert (result.rows, result.misplaced) == (result.actions, 0)
+    assert (result.ticks_without_command, result.missed) == (0, 0)
+    assert len(result.learning) > 10
 
 
 def _limit_files(process: NodeProcess, size: int) -> None:

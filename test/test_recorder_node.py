@@ -19,6 +19,9 @@ from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.last_action import last_actions
 from rebt_ros.storage.recording import is_recording, read_recording, recordings
 
+#: The tests' robots do not send states all the time: their last actions would wait for the next.
+PROMPT: dict[str, object] = {"state_wait": 0.2}
+
 
 def _recorded(directory: Path) -> list[Demonstration]:
     return [read_recording(path).demonstration for path in recordings(directory)]
@@ -36,7 +39,7 @@ def _lat(demonstration: Demonstration) -> list[str | None]:
 def test_an_action_in_a_burst_gets_the_state_that_held(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    with NodeProcess("recorder_node", domain, tmp_path):
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT):
         peer.state(0.0, labels=["x"])
         peer.action("start")
         for burst in range(1, 40):
@@ -54,7 +57,7 @@ def test_an_action_in_a_burst_gets_the_state_that_held(
 
 
 def test_bad_messages_are_counted_and_left_out(domain: int, peer: Peer, tmp_path: Path) -> None:
-    with NodeProcess("recorder_node", domain, tmp_path) as recorder:
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT) as recorder:
         peer.action("too early")
         peer.state(1.0, 2.0)
         peer.state(1.0, 2.0, 3.0)
@@ -88,7 +91,7 @@ def test_bad_messages_are_counted_and_left_out(domain: int, peer: Peer, tmp_path
 def test_a_new_demonstration_begins_without_a_last_action_but_with_the_state(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    with NodeProcess("recorder_node", domain, tmp_path):
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT):
         peer.state(1.0)
         for label in ("go", "turn", "turn"):
             peer.action(label)
@@ -105,7 +108,7 @@ def test_a_new_demonstration_begins_without_a_last_action_but_with_the_state(
 
 
 def test_a_discarded_demonstration_leaves_no_file(domain: int, peer: Peer, tmp_path: Path) -> None:
-    with NodeProcess("recorder_node", domain, tmp_path):
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT):
         peer.state(1.0)
         peer.action("wrong")
         answer = peer.call("/recorder/discard_demonstration")
@@ -120,7 +123,7 @@ def test_a_discarded_demonstration_leaves_no_file(domain: int, peer: Peer, tmp_p
 
 
 def test_nothing_is_recorded_until_asked_for(domain: int, peer: Peer, tmp_path: Path) -> None:
-    with NodeProcess("recorder_node", domain, tmp_path, {"recording": False}):
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT | {"recording": False}):
         peer.state(1.0)
         peer.action("before")
         assert peer.call("/recorder/record", True).success
@@ -136,7 +139,7 @@ def test_nothing_is_recorded_until_asked_for(domain: int, peer: Peer, tmp_path: 
 def test_a_signal_ends_the_file_in_order(
     domain: int, peer: Peer, tmp_path: Path, number: signal.Signals
 ) -> None:
-    with NodeProcess("recorder_node", domain, tmp_path) as recorder:
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT) as recorder:
         peer.state(1.0)
         peer.action("go")
         peer.wait_until(lambda: list(tmp_path.glob("demonstrations/*.rec")))
@@ -168,7 +171,9 @@ def test_fields_are_named_by_parameter_and_channels_kept_apart(
         "state_fields": ["pose:x,y"],
         "state_qos": "sensor_data",
     }
-    with NodeProcess("recorder_node", domain, tmp_path, parameters, ["-r", "__ns:=/robot"]):
+    with NodeProcess(
+        "recorder_node", domain, tmp_path, PROMPT | parameters, ["-r", "__ns:=/robot"]
+    ):
 
         def both_heard() -> bool:
             peer.state(1.0, 2.0, topic="/robot/pose")
@@ -213,7 +218,7 @@ def test_a_held_action_is_sampled_at_the_rate_asked_for(
 def test_rows_carry_simulated_time_where_it_is_in_use(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    with NodeProcess("recorder_node", domain, tmp_path, {"use_sim_time": True}):
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT | {"use_sim_time": True}):
         peer.state(1.0)
 
         def stamped() -> bool:
@@ -234,7 +239,7 @@ def test_recording_goes_on_once_there_is_room_again(
 ) -> None:
     blocked = tmp_path / "demonstrations"
     blocked.write_text("a file where the directory should be")
-    with NodeProcess("recorder_node", domain, tmp_path) as recorder:
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT) as recorder:
         peer.state(1.0)
         peer.action("lost")
         recorder.says("[ERROR]")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-POLICY: Final = Path(__file__).resolve().parents[1] / "config" / "sros2_policy.xml"
+CHECKOUT: Final = Path(__file__).resolve().parents[1]
+POLICY: Final = CHECKOUT / "config" / "sros2_policy.xml"
 
 #: Elements, what may stand in each, and its attributes: policy.xsd of sros2, version 0.2.0.
 CHILDREN: Final = {
@@ -103,6 +105,30 @@ def test_an_operator_may_call_what_the_nodes_offer_beside_parameters() -> None:
     assert granted("operator").request == {
         name for name in offered if name.rsplit("/", 1)[1] not in common
     }
+
+
+def test_the_documented_table_is_the_policy() -> None:
+    common = {
+        qualifier: set.intersection(*(set(getattr(granted(node), qualifier)) for node in NODES))
+        for qualifier in ("publish", "subscribe")
+    }
+    parameters = {name.rsplit("/", 1)[1] for name in granted("learner").reply} - {
+        "relearn",
+        "cancel",
+    }
+    lines = (CHECKOUT / "docs" / "security.md").read_text(encoding="utf-8").splitlines()
+    for node in NODES:
+        (line,) = (one for one in lines if one.startswith(f"| `/rebt_ros/{node}` |"))
+        published, subscribed, offered = (
+            {full(name, node) for name in re.findall(r"`([^`]+)`", cell)}
+            for cell in line.split("|")[2:5]
+        )
+        rights = granted(node)
+        assert published == rights.publish - common["publish"]
+        assert subscribed == rights.subscribe - common["subscribe"]
+        assert offered == {
+            name for name in rights.reply if name.rsplit("/", 1)[1] not in parameters
+        }
 
 
 def test_the_policy_allows_what_the_running_nodes_have_and_nothing_else(tmp_path: Path) -> None:

@@ -7,12 +7,14 @@ received, into a `DemonstrationBuilder`; it answers with the rows that they comp
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import chain
 
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.recent_states import RecentStates
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError, OptionError
 
@@ -65,11 +67,17 @@ class DemonstrationBuilder:
     In event mode a row is one action message.  In sampled mode it is one instant of a fixed grid
     on each channel that has an action, from its first message on; an empty label ends the action.
 
+    A row has the newest states that the builder was given.  In event mode, messages may come with
+    the time at which they were sent; then a row has the newest states that were sent before its
+    action, in whatever order they are given.
+
     Args:
         topics: State topics, in the order of their features.
         channels: Action topics; each is a channel with a LAT of its own.
         sample_rate: Rows per second and channel while an action holds; None for event mode.
         before: What was done on each channel before the demonstration, most recent last.
+        recent: States by topic that were sent before the demonstration, for actions that come
+            late; the builder adds to them.
 
     Raises:
         OptionError: No topic or channel, one named twice, or a rate that makes no sense.
@@ -81,6 +89,7 @@ class DemonstrationBuilder:
         channels: Sequence[str],
         sample_rate: float | None = None,
         before: Mapping[str, Sequence[str]] | None = None,
+        recent: dict[str, RecentStates] | None = None,
     ) -> None:
         names = [topic.name for topic in topics]
         if not names or not channels:
@@ -94,6 +103,7 @@ class DemonstrationBuilder:
             )
         self._fields: dict[str, tuple[str, ...]] = {one.name: one.fields for one in topics}
         self._latest: dict[str, tuple[float, ...]] = {}
+        self._recent = {} if recent is None else recent
         self._features: tuple[Feature, ...] | None = None
         self._history = {
             channel: ActionHistory((before or {}).get(channel, ())) for channel in channels
@@ -109,15 +119,21 @@ class DemonstrationBuilder:
         return self._features
 
     def observe(
-        self, stamp: int, topic: str, values: Sequence[float], labels: Sequence[str] = ()
+        self,
+        stamp: int,
+        topic: str,
+        values: Sequence[float],
+        labels: Sequence[str] = (),
+        sent: int | None = None,
     ) -> tuple[Row, ...]:
         """Takes a state message.
 
         Args:
-            stamp: When it was received, nanoseconds.
+            stamp: What rows say that it completes, nanoseconds: when it was received, as a rule.
             topic: State topic it came on.
             values: Its numbers.
             labels: Names that the message itself gives to its numbers; used once, if at all.
+            sent: When it was sent, nanoseconds, by the clock of all messages; None: not known.
 
         Returns:
             The sampled rows that were due before it; none in event mode.
@@ -136,18 +152,23 @@ class DemonstrationBuilder:
                 else tuple(f"{_base(topic)}[{index}]" for index in range(len(state)))
             )
         self._latest[topic] = state
+        if sent is None:
+            self._recent.pop(topic, None)
+        else:
+            self._recent.setdefault(topic, RecentStates()).add(sent, state)
         self._last_observed = stamp
         if self._features is None and len(self._latest) == len(self._fields):
             self._features = _features(self._fields)
         return due
 
-    def act(self, stamp: int, channel: str, label: str) -> tuple[Row, ...]:
+    def act(self, stamp: int, channel: str, label: str, sent: int | None = None) -> tuple[Row, ...]:
         """Takes an action message.
 
         Args:
-            stamp: When it was received, nanoseconds.
+            stamp: What its row says, nanoseconds: when it was received, as a rule.
             channel: Action topic it came on.
             label: The action; empty where none is taken any longer.
+            sent: When it was sent, nanoseconds, by the clock of all messages; None: not known.
 
         Returns:
             The rows that it completes: itself in event mode, those due before it in sampled mode.
@@ -165,13 +186,7 @@ class DemonstrationBuilder:
                 f"action topic {channel!r} sent the label {label!r}: "
                 "labels must consist of printable characters.",
             )
-        if self._features is None:
-            silent = [topic for topic in self._fields if topic not in self._latest]
-            raise BadMessageError(
-                Fault.NO_STATE,
-                f"action {label!r} came before the first message on state topic {silent[0]!r}: "
-                "it is left out, because the state it belongs to is not known.",
-            )
+        states = self._states_at(None if self._period is not None else sent, label)
         due = self._sample_until(stamp)
         if not label:
             self._held.pop(channel, None)
@@ -181,7 +196,30 @@ class DemonstrationBuilder:
             if self._next_sample is None:
                 self._next_sample = stamp
             return due
-        return (self._row(stamp, channel, label),)
+        return (self._row(stamp, channel, label, states),)
+
+    def _states_at(self, sent: int | None, label: str) -> tuple[tuple[float, ...], ...]:
+        """The state of each topic that an action belongs to.
+
+        Raises:
+            BadMessageError: Not all of them are known.
+        """
+        states = []
+        for topic in self._fields:
+            recent = self._recent.get(topic)
+            known = self._latest.get(topic)
+            came = "came before the first message"
+            if known is not None and sent is not None and recent is not None:
+                known = recent.at(sent)
+                came = "was sent before the first message that is known"
+            if known is None:
+                raise BadMessageError(
+                    Fault.NO_STATE,
+                    f"action {label!r} {came} on state topic {topic!r}: "
+                    "it is left out, because the state it belongs to is not known.",
+                )
+            states.append(known)
+        return tuple(states)
 
     def _check_state(self, topic: str, state: tuple[float, ...]) -> None:
         if topic not in self._fields:
@@ -217,20 +255,22 @@ class DemonstrationBuilder:
                     f"values must lie within ±{LARGEST_VALUE:g}.",
                 )
 
-    def _row(self, stamp: int, channel: str, label: str) -> Row:
+    def _row(
+        self, stamp: int, channel: str, label: str, states: Iterable[tuple[float, ...]]
+    ) -> Row:
         history = self._history[channel]
         last_action = history.before(label)
         history.take(label)
-        state = tuple(value for topic in self._fields for value in self._latest[topic])
-        return Row(stamp, channel, label, last_action, state)
+        return Row(stamp, channel, label, last_action, tuple(chain.from_iterable(states)))
 
     def _sample_until(self, stamp: int) -> tuple[Row, ...]:
         if self._period is None or self._next_sample is None:
             return ()
         rows: list[Row] = []
         end = min(stamp, self._last_observed + _STALE)
+        states = [self._latest[topic] for topic in self._fields]
         while self._next_sample < end:
-            rows += [self._row(self._next_sample, *held) for held in self._held.items()]
+            rows += [self._row(self._next_sample, *held, states) for held in self._held.items()]
             self._next_sample += self._period
         if self._next_sample < stamp or self._next_sample > stamp + self._period:
             # Silence or a clock that was set back: the grid starts anew here.

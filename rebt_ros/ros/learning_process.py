@@ -187,8 +187,9 @@ class LearningProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 env=dict(os.environ, PYTHONPATH=os.pathsep.join(filter(None, paths))),
-                # Control-C in a terminal is for the node alone.
-                process_group=0,
+                # Control-C in a terminal is for the node alone.  And Linux shares the processor out
+                # among sessions first: only one of its own can stand back for those of other nodes.
+                start_new_session=True,
             )
         except OSError as err:
             raise LearningError(

@@ -26,7 +26,7 @@ from rebt_ros.ros.learning_process import Lesson, Progress, Request
 _READING: Final = 0.1
 
 #: How much later than a node it gets the processor, and how much sooner it is ended where memory
-#: runs out (see nice(2) and proc(5)).
+#: runs out (see nice(2), sched(7) and proc(5)); its session has to stand back as well as itself.
 _NICENESS: Final = 5
 _OUT_OF_MEMORY_SCORE: Final = "500"
 
@@ -73,8 +73,11 @@ def _end_with(node: int) -> None:
 
 def _stand_back() -> None:
     os.nice(_NICENESS)
-    with contextlib.suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text(_OUT_OF_MEMORY_SCORE)
+    settings = {"oom_score_adj": _OUT_OF_MEMORY_SCORE, "autogroup": str(_NICENESS)}
+    for name, value in settings.items():
+        # Not every kernel has them.
+        with contextlib.suppress(OSError):
+            Path("/proc/self", name).write_text(value)
 
 
 def _warm_up() -> None:

@@ -18,17 +18,18 @@ from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
-from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.fields import fields_of
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
 from rebt_ros.ros import lifetime
-from rebt_ros.ros.arrival import ArrivalOrder
+from rebt_ros.ros.arrival import LAST, ArrivalOrder
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.losses import Losses
-from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.recorder_settings import declare_settings
 from rebt_ros.ros.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
+from rebt_ros.ros.sending_time import SendingTime, received_at
+from rebt_ros.ros.state_streams import StateStreams
 from rebt_ros.storage.recording import RecordingWriter
 
 #: Long enough that no message of a burst is lost while the disk is slow.
@@ -36,6 +37,12 @@ _QUEUE: Final = 5000
 
 #: An action that came so long after it was sent may belong to another state (seconds).
 _LATE: Final = 1.0
+
+#: Least time between two fetches (seconds).
+_LEAST_PERIOD: Final = 0.005
+
+#: Time between two looks at who publishes (seconds).
+_LOOK_PERIOD: Final = 0.5
 
 #: A state topic is silent after this long without a message (seconds).
 _SILENT: Final = 2.0
@@ -62,8 +69,9 @@ class _Fetched(CallbackGroup):
 class RecorderNode(Node):
     """Subscribes to states and actions, and writes one recording per demonstration.
 
-    Messages and service calls take effect in the order in which they were received, whatever the
-    order of their callbacks; so an action is recorded with the state that held when it came.
+    Messages and service calls take effect in the order in which they were sent, or received where
+    the clocks of publishers cannot be compared, whatever the order of their callbacks; so an action
+    is recorded with the state that held then (see `PairBy`).
 
     Raises:
         OptionError: A parameter makes no sense.
@@ -71,118 +79,40 @@ class RecorderNode(Node):
 
     def __init__(self) -> None:
         super().__init__("recorder")
-        declare = Parameters(self)
-        state_topics = declare.texts(
-            "state_topics", ["state"], "Float64MultiArray topics, in the order of their features."
-        )()
-        action_topics = declare.texts(
-            "action_topics", ["action"], "String topics; each is a channel of its own."
-        )()
-        fields = declare.texts(
-            "state_fields",
-            [],
-            "Names of the values of state topics, each entry as in 'state:front,left,right'; "
-            "where a topic has none, its messages' layout labels name them, else their index.",
-        )()
-        commands = declare.text(
-            "command_topic",
-            "command",
-            "String topic of the executor's commands, as a correction knows what they did before "
-            "it (with several action_topics: a topic below it for each); empty for none.",
-        )()
-        driving = declare.text(
-            "driving_topic",
-            "executor/driving",
-            "Bool topic on which the executor says whether it drives: what a person does while it "
-            "drives is a demonstration of its own; empty for none.",
-        )()
-        directory = declare.directory(
-            "demonstrations", "demonstrations", "Directory of the recordings; ~ is your home."
-        )()
-        sample_rate = declare.number(
-            "sample_rate",
-            0.0,
-            "Rows per second while an action holds; 0.0 for one row per action message.",
-            0.0,
-            1000.0,
-        )()
-        start = declare.flag("recording", True, "Whether to record from the start.")()
-        reliability = declare.text(
-            "state_qos",
-            "reliable",
-            "How to subscribe to states: sensor_data also hears best-effort publishers.",
-            choices=("reliable", "sensor_data"),
-        )()
-        window = declare.number(
-            "reorder_window",
-            0.05,
-            "How long to wait for messages that were received earlier (seconds).",
-            0.0,
-            1.0,
-        )()
-
-        sync_period = declare.number(
-            "sync_period",
-            0.0,
-            "How often rows are made to survive a loss of power (seconds); 0.0 for only when a "
-            "demonstration ends.",
-            0.0,
-            3600.0,
-        )()
-
-        def open_writer(features: tuple[Feature, ...]) -> Writer:
-            writer = RecordingWriter(
-                directory, features, action_topics, sample_rate=sample_rate or None
-            )
-            self.get_logger().info(f"recording to {writer.path}.")
-            return writer
-
+        settings = declare_settings(self)
+        self._settings = settings
         self._faults = Faults(self.get_logger())
         self._session = RecordingSession(
-            _state_topics(state_topics, fields),
-            action_topics,
-            sample_rate or None,
-            open_writer,
+            settings.state_topics,
+            settings.action_topics,
+            settings.sample_rate,
+            self._open_writer,
             lambda kind, text: self._faults.note(kind, text, severe=kind == WRITE_ERROR),
         )
-        self._check_names([*state_topics, *action_topics])
-        self._order = ArrivalOrder[Callable[[], object]](round(window * 1e9))
-        self._received = dict.fromkeys(state_topics, 0)
+        self._check_names(settings.sources)
+        self._order = ArrivalOrder[Callable[[], object]](
+            settings.reorder_window, settings.state_wait
+        )
+        self._streams = StateStreams(
+            (topic.name for topic in settings.state_topics), settings.state_wait
+        )
+        self._received = dict.fromkeys((topic.name for topic in settings.state_topics), 0)
         self._messages = 0
         self._lost = 0
-        self._losses = Losses([*state_topics, *action_topics])
-        self._reliable = [*action_topics, *(state_topics if reliability == "reliable" else ())]
+        self._losses = Losses(settings.sources)
+        self._reliable = settings.action_topics if settings.best_effort else settings.sources
         self._heard: dict[str, float] = {}
         self._reported = time.monotonic()
+        self._immediate = settings.reorder_window == 0
+        self._sources: list[Subscription] = []
+        self._listen_to_demonstrator()
+        self._listen_to_executor()
+        topics = [source.topic_name for source in self._sources]
+        self._sending = SendingTime(self, topics, settings.pair_by)
+        self._begin()
 
-        self._immediate = window == 0.0
-        waking = None if self._immediate else _Fetched()
-        states, actions = QoSProfile(depth=_QUEUE), QoSProfile(depth=_QUEUE)
-        if reliability == "sensor_data":
-            states.reliability = ReliabilityPolicy.BEST_EFFORT
-        self._sources: list[Subscription] = [
-            *(
-                self.create_subscription(
-                    Float64MultiArray,
-                    topic,
-                    partial(self._on_state, topic),
-                    states,
-                    callback_group=waking,
-                )
-                for topic in state_topics
-            ),
-            *(
-                self.create_subscription(
-                    String,
-                    topic,
-                    partial(self._on_action, topic),
-                    actions,
-                    callback_group=waking,
-                )
-                for topic in action_topics
-            ),
-        ]
-        self._listen_to_executor(commands, driving, action_topics)
+    def _begin(self) -> None:
+        """Opens everything else that calls back."""
         # Of their own, because their answers wait for the messages received before.
         group = MutuallyExclusiveCallbackGroup()
         for name, kind, command in (
@@ -191,36 +121,76 @@ class RecorderNode(Node):
             ("~/discard_demonstration", Trigger, lambda _, stamp: self._session.discard(stamp)),
         ):
             self.create_service(kind, name, partial(self._serve, command), callback_group=group)
+        settings = self._settings
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
         if not self._immediate:
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self.create_timer(max(window / 2, 0.005), self._take_ready, clock=steady)
-        if sync_period:
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            period = max(settings.reorder_window / 2e9, _LEAST_PERIOD)
+            self.create_timer(period, self._take_ready, clock=steady)
+        self.create_timer(_LOOK_PERIOD, self._look_at_publishers, clock=steady)
+        if settings.sync_period:
             self.create_timer(
-                sync_period,
+                settings.sync_period,
                 lambda: self._session.sync(self._stamp(time.time_ns())),
                 clock=steady,
             )
         self._diagnostics = Diagnostics(self, "recording", self._report)
-        if start:
+        if settings.recording:
             self._session.start(self._stamp(time.time_ns()))
         self.get_logger().info(
-            f"{'recording' if start else 'ready to record'} {', '.join(action_topics)} with "
-            f"{', '.join(state_topics)} to {directory.resolve()}."
+            f"{'recording' if settings.recording else 'ready to record'} "
+            f"{', '.join(settings.action_topics)} with "
+            f"{', '.join(topic.name for topic in settings.state_topics)} "
+            f"to {settings.demonstrations.resolve()}."
         )
 
     def close(self) -> None:
         """Writes what has been received, and ends the recording."""
         self._take_waiting_messages()
-        for take in self._order.flush():
+        for take in self._order.flush(self._complete(time.monotonic_ns())):
             take()
+        if self._order.held:
+            self.get_logger().warning(
+                f"{self._order.held} actions are left out: the states that they belong to had not "
+                "come when the recorder was stopped."
+            )
         if self._session.recording:
             answer = self._session.stop()
             log = self.get_logger().info if answer.success else self.get_logger().error
             log(answer.message)
 
-    def _listen_to_executor(self, commands: str, driving: str, channels: Sequence[str]) -> None:
+    def _open_writer(self, features: tuple[Feature, ...]) -> Writer:
+        settings = self._settings
+        writer = RecordingWriter(
+            settings.demonstrations,
+            features,
+            settings.action_topics,
+            sample_rate=settings.sample_rate,
+        )
+        self.get_logger().info(f"recording to {writer.path}.")
+        return writer
+
+    def _listen_to_demonstrator(self) -> None:
+        waking = None if self._immediate else _Fetched()
+        states, actions = QoSProfile(depth=_QUEUE), QoSProfile(depth=_QUEUE)
+        if self._settings.best_effort:
+            states.reliability = ReliabilityPolicy.BEST_EFFORT
+        for topic in self._settings.state_topics:
+            take = partial(self._on_state, topic.name)
+            self._sources.append(
+                self.create_subscription(
+                    Float64MultiArray, topic.name, take, states, callback_group=waking
+                )
+            )
+        for channel in self._settings.action_topics:
+            take = partial(self._on_action, channel)
+            self._sources.append(
+                self.create_subscription(String, channel, take, actions, callback_group=waking)
+            )
+
+    def _listen_to_executor(self) -> None:
         """Subscribes to what tells demonstrations and corrections apart."""
+        commands, driving = self._settings.executor.commands, self._settings.executor.driving
+        channels = self._settings.action_topics
         shown = {self.resolve_topic_name(channel) for channel in channels}
         for channel in channels if commands else ():
             topic = topic_of(commands, channel, channels)
@@ -236,14 +206,13 @@ class RecorderNode(Node):
             )
 
     def _on_command(self, channel: str, message: String, info: dict[str, Any]) -> None:
-        received = _received(info)
-        stamp = self._stamp(received)
-        self._queue(received, partial(self._session.command, stamp, channel, message.data))
+        place = self._place(info)
+        stamp = self._stamp(place)
+        self._queue(place, partial(self._session.command, stamp, channel, message.data))
 
     def _on_driving(self, message: Bool, info: dict[str, Any]) -> None:
-        received = _received(info)
-        stamp = self._stamp(received)
-        self._queue(received, partial(self._session.drive, stamp, message.data))
+        place = self._place(info)
+        self._queue(place, partial(self._session.drive, self._stamp(place), message.data))
 
     def _check_names(self, topics: Sequence[str]) -> None:
         for topic in topics:
@@ -258,30 +227,46 @@ class RecorderNode(Node):
     def _on_state(self, topic: str, message: Float64MultiArray, info: dict[str, Any]) -> None:
         self._received[topic] += 1
         self._heard[topic] = time.monotonic()
-        received = self._note(topic, info)
+        self._note(topic, info)
+        sent = self._sending.of(info)
+        if sent is not None:
+            self._streams.take(topic, sent, time.monotonic_ns())
+        place = received_at(info) if sent is None else sent
         labels = fields_of([one.label for one in message.layout.dim], len(message.data))
-        stamp = self._stamp(received)
-        self._queue(received, partial(self._session.observe, stamp, topic, message.data, labels))
+        stamp = self._stamp(place)
+        self._queue(place, partial(self._session.observe, stamp, topic, message.data, labels, sent))
 
     def _on_action(self, topic: str, message: String, info: dict[str, Any]) -> None:
-        received = self._note(topic, info)
+        self._note(topic, info)
+        sent = self._sending.of(info)
+        received = received_at(info)
         late = (received - (info.get("source_timestamp") or received)) / 1e9
-        if late > _LATE:
+        if sent is None and late > _LATE:
             self._faults.note(
                 "late action",
                 f"an action on {topic!r} came {late:.1f} s after it was sent and has the state of "
                 "its arrival: wait until recorder and publisher know each other, and check that "
                 "their clocks agree.",
             )
-        self._queue(
-            received, partial(self._session.act, self._stamp(received), topic, message.data)
-        )
+        place = received if sent is None else sent
+        take = partial(self._session.act, self._stamp(place), topic, message.data, sent)
+        self._queue(place, take, waits=sent is not None)
 
-    def _note(self, topic: str, info: dict[str, Any]) -> int:
-        """Counts a message; returns when it was received, nanoseconds."""
+    def _note(self, topic: str, info: dict[str, Any]) -> None:
+        """Counts a message."""
         self._messages += 1
         self._losses.take(topic, info.get("publication_sequence_number"))
-        return _received(info)
+
+    def _place(self, info: dict[str, Any]) -> int:
+        """Where a message belongs among the others, nanoseconds."""
+        sent = self._sending.of(info)
+        return received_at(info) if sent is None else sent
+
+    def _look_at_publishers(self) -> None:
+        silent = self._sending.look()
+        for topic in self._settings.state_topics:
+            if self.resolve_topic_name(topic.name) in silent:
+                self._streams.end(topic.name)
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any
@@ -298,8 +283,8 @@ class RecorderNode(Node):
     def _record(self, request: SetBool.Request, stamp: int) -> Answer:
         return self._session.start(stamp) if request.data else self._session.stop()
 
-    def _queue(self, received: int, take: Callable[[], object]) -> None:
-        self._order.push(received, take, time.monotonic_ns())
+    def _queue(self, place: int, take: Callable[[], object], *, waits: bool = False) -> None:
+        self._order.push(place, take, time.monotonic_ns(), waits=waits)
         if self._immediate:
             self._take_ready()
 
@@ -307,8 +292,12 @@ class RecorderNode(Node):
         now = time.monotonic_ns()
         if not self._immediate:
             self._take_waiting_messages()
-        for take in self._order.ready(now):
+        for take in self._order.ready(now, self._complete(now)):
             take()
+
+    def _complete(self, now: int) -> int:
+        """All states that were sent up to then have come, as far as that matters."""
+        return self._streams.complete(now) if self._sending.comparable else LAST
 
     def _take_waiting_messages(self) -> None:
         """Fetches what was received and still waits for its callback.
@@ -324,11 +313,11 @@ class RecorderNode(Node):
                         break
                     source.callback(*taken)
 
-    def _stamp(self, received: int) -> int:
-        """What a row says: time of reception, or simulated time where that is in use."""
+    def _stamp(self, place: int) -> int:
+        """What a row says: its action's place, or simulated time where that is in use."""
         clock = self.get_clock()
         simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
-        return int(clock.now().nanoseconds) if simulated else received
+        return int(clock.now().nanoseconds) if simulated else place
 
     def _count_losses(self) -> None:
         for topic, count in self._losses.settle(self.count_publishers).items():
@@ -351,6 +340,8 @@ class RecorderNode(Node):
             "takeovers": session.takeovers,
             "messages": self._messages,
             "messages lost": self._lost,
+            "actions that wait for their state": self._order.held,
+            "paired by": "sent" if self._sending.comparable else "received",
             "demonstration": session.writer.path if session.writer else "none yet",
             "rows of the demonstration": session.writer.rows if session.writer else 0,
         }
@@ -368,30 +359,6 @@ class RecorderNode(Node):
         if silent:
             return Report(Level.WARN, f"no messages on {', '.join(silent)}", values)
         return Report(Level.OK, "recording", values)
-
-
-def _state_topics(names: Sequence[str], fields: Sequence[str]) -> list[StateTopic]:
-    """The state topics, with their fields where an entry "topic:field,field" gives them."""
-    named: dict[str, tuple[str, ...]] = {}
-    for entry in fields:
-        topic, colon, listed = entry.partition(":")
-        parts = tuple(one.strip() for one in listed.split(","))
-        if not colon or not all(parts):
-            raise OptionError(
-                f"parameter 'state_fields' has {entry!r}: write it as 'topic:field,field'."
-            )
-        if topic not in names or topic in named:
-            raise OptionError(
-                f"parameter 'state_fields' names {topic!r}, which state_topics "
-                f"{'does not name' if topic not in names else 'has fields for already'}."
-            )
-        named[topic] = parts
-    return [StateTopic(name, named.get(name, ())) for name in names]
-
-
-def _received(info: dict[str, Any]) -> int:
-    """When a message was received, nanoseconds; not every middleware says."""
-    return info.get("received_timestamp") or info.get("source_timestamp") or time.time_ns()
 
 
 def main(args: list[str] | None = None) -> None:

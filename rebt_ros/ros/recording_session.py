@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Row
+from rebt_ros.demonstration.recent_states import RecentStates
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import RebtError
 from rebt_ros.ros.takeover_watch import TakeoverWatch
@@ -57,6 +58,7 @@ class _Message(NamedTuple):
     stamp: int
     values: Sequence[float]
     labels: Sequence[str]
+    sent: int | None
 
 
 class RecordingSession:
@@ -93,6 +95,7 @@ class RecordingSession:
         DemonstrationBuilder(self._topics, self._channels, sample_rate)
         self._watch = TakeoverWatch(self._channels)
         self._latest: dict[str, _Message] = {}
+        self._recent: dict[str, RecentStates] = {}
         # Topics whose last message was refused.
         self._unclear: set[str] = set()
         self._held: dict[str, str] = {}
@@ -122,14 +125,19 @@ class RecordingSession:
         return self._writer
 
     def observe(
-        self, stamp: int, topic: str, values: Sequence[float], labels: Sequence[str]
+        self,
+        stamp: int,
+        topic: str,
+        values: Sequence[float],
+        labels: Sequence[str],
+        sent: int | None = None,
     ) -> None:
         """Takes a state message (see `DemonstrationBuilder.observe`)."""
         before = self._latest.get(topic)
         if not labels and before is not None and len(before.labels) == len(values):
             # Some publishers name their fields in the first message only.
             labels = before.labels
-        message = _Message(stamp, values, labels)
+        message = _Message(stamp, values, labels, sent)
         if self._builder is None:
             self._latest[topic] = message
             return
@@ -137,12 +145,12 @@ class RecordingSession:
             # What is refused may be an intruder or the first of a new length: a demonstration to
             # come begins with neither of both kinds, but with the message after it.
             self._unclear.add(topic)
-            rows = self._builder.observe(stamp, topic, values, labels)
+            rows = self._builder.observe(stamp, topic, values, labels, sent)
             self._unclear.discard(topic)
             self._latest[topic] = message
             self._write(rows)
 
-    def act(self, stamp: int, channel: str, label: str) -> None:
+    def act(self, stamp: int, channel: str, label: str, sent: int | None = None) -> None:
         """Takes an action message (see `DemonstrationBuilder.act`)."""
         before = self._watch.act(stamp, channel, label)
         if before is not None and self.recording:
@@ -151,7 +159,7 @@ class RecordingSession:
         self._held[channel] = label
         if self._builder is not None:
             with self._noting_faults():
-                self._write(self._builder.act(stamp, channel, label))
+                self._write(self._builder.act(stamp, channel, label, sent))
 
     def command(self, stamp: int, channel: str, label: str) -> None:
         """Takes a command of the executor: what is held by a person ends with it."""
@@ -167,6 +175,8 @@ class RecordingSession:
         """Begins to record, with a new demonstration."""
         if self.recording:
             return Answer(True, "already recording.")
+        # States were not taken since they were added last.
+        self._recent.clear()
         self._begin(stamp)
         return Answer(True, "recording: the demonstration's file is opened at its first action.")
 
@@ -227,12 +237,14 @@ class RecordingSession:
 
     def _begin(self, stamp: int, before: Mapping[str, Sequence[str]] | None = None) -> None:
         """Starts a demonstration that knows the present state, and of the past only `before`."""
-        builder = DemonstrationBuilder(self._topics, self._channels, self._sample_rate, before)
-        for topic, (when, values, labels) in self._latest.items():
+        builder = DemonstrationBuilder(
+            self._topics, self._channels, self._sample_rate, before, self._recent
+        )
+        for topic, (when, values, labels, sent) in self._latest.items():
             if topic in self._unclear:
                 continue
             with contextlib.suppress(BadMessageError):
-                builder.observe(when, topic, values, labels)
+                builder.observe(when, topic, values, labels, sent)
         if self._sample_rate is not None:
             for channel, label in self._held.items():
                 with contextlib.suppress(BadMessageError):

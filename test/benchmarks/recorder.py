@@ -1,7 +1,7 @@
 """What the recorder holds and what it costs, measured: kills, load, CPU per message, reading.
 
     PYTHONPATH=.:test python test/benchmarks/recorder.py [--kills N] [--seconds S] [--rounds N]
-        [--rows N] [--only kills,load,cpu,read]
+        [--rows N] [--only kills,load,freezes,relearn,cpu,read]
 
 Prints a table and writes bench-results/recorder.json.  `pandas.read_csv` is a peer in reading where
 it is installed.
@@ -27,18 +27,22 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from load_publisher import ACTIONS
-from recorder_trials import Load, cpu_seconds, kill_recorders, load_recorder
+from recorder_trials import (
+    WIDTH,
+    Load,
+    cpu_seconds,
+    kill_recorders,
+    large_recording,
+    load_recorder,
+    relearn_meanwhile,
+)
 from ros_processes import NodeProcess, own_domain
 
-from rebt_ros.demonstration.demonstration import Row
-from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import tabulate
-from rebt_ros.storage.recording import RecordingWriter, read_recording
+from rebt_ros.storage.recording import read_recording
 from rebt_ros.storage.recording_rows import LABEL, record_type
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-WIDTH = 24
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,55 @@ def load(seconds: float, directory: Path) -> list[Figure]:
         figure(f"rows lost in {seconds:g} s of load", result.actions - result.rows, 0, detail),
         figure("messages dropped", sent - result.messages, 0),
         figure("growth of memory (MB)", max(settled) - settled[0], 10),
+    ]
+
+
+def freezes(seconds: float, directory: Path) -> list[Figure]:
+    """1 kHz states, and the recorder stands still again and again.
+
+    What the transport drops is sent again after 3 s; the publisher keeps its last 5000 messages.
+    """
+    count = max(1, round(seconds / 10))
+    result = load_recorder(seconds, directory, state_rate=1000, freezes=[0.7] * count)
+    name = f"while it stood still {count} times for 0.7 s"
+    detail = (
+        f"{result.states} states and {result.actions} actions sent, {result.rows} rows, "
+        f"{result.lost_messages} messages lost"
+    )
+    return [
+        figure(f"rows lost {name}", result.actions - result.rows, 0, detail),
+        figure(f"rows with another state {name}", result.misplaced, 0),
+    ]
+
+
+def relearn(seconds: float, directory: Path) -> list[Figure]:
+    """1 kHz states, 100 Hz actions and ticks, half of the time during a relearn of many rows."""
+    table = directory / "table"
+    table.mkdir()
+    large_recording(1_000_000, table)
+    result = relearn_meanwhile(seconds, directory, table)
+
+    def spread(intervals: list[float]) -> str:
+        off = np.abs(np.array(intervals) - 10.0)
+        p50, p99 = np.percentile(off, (50, 99))
+        return f"{p50:.2f} / {p99:.2f} / {off.max():.1f} ms"
+
+    resting, learning = (
+        float(np.percentile(np.abs(np.array(one) - 10.0), 99))
+        for one in (result.resting, result.learning)
+    )
+    detail = (
+        f"off 10 ms, p50 / p99 / max: {spread(result.resting)} of {len(result.resting)} ticks at "
+        f"rest, {spread(result.learning)} of {len(result.learning)} during a relearn; "
+        f"{result.lost_messages} messages lost by the recorder"
+    )
+    return [
+        figure(
+            "jitter of ticks during a relearn - at rest (p99, ms)", learning - resting, 5, detail
+        ),
+        figure("rows lost", result.actions - result.rows, 0),
+        figure("rows with another state", result.misplaced, 0),
+        figure("commands missed or doubled", result.ticks_without_command + result.missed, 0),
     ]
 
 
@@ -135,7 +188,7 @@ def _subject(subject: str, domain: int, directory: Path) -> Iterator[subprocess.
 
 def read(rows: int, rounds: int, directory: Path) -> list[Figure]:
     """Reading a recording, against numpy alone, and pandas reading the same table as CSV."""
-    small = recording(min(rows, 1_000_000), directory)
+    small = large_recording(min(rows, 1_000_000), directory)
     peers: dict[str, Callable[[], object]] = {
         "read_recording": lambda: read_recording(small),
         "numpy": lambda: _numpy_alone(small),
@@ -160,7 +213,7 @@ def read(rows: int, rounds: int, directory: Path) -> list[Figure]:
     figures = [figure("reading / numpy alone", ours / median(measured["numpy"]), 1.2, detail)]
     if "pandas" in measured:
         figures.append(figure("reading / pandas.read_csv", ours / median(measured["pandas"]), 1.2))
-    large = recording(rows, directory)
+    large = large_recording(rows, directory)
     seconds, reading, joining = _peak_memory(large)
     detail = f"{rows} rows x {WIDTH} in {seconds:.1f} s"
     return [
@@ -168,23 +221,6 @@ def read(rows: int, rounds: int, directory: Path) -> list[Figure]:
         figure("peak memory of reading / table", reading, 4, detail),
         figure("peak memory of reading and tabulating / table", joining, 4),
     ]
-
-
-def recording(rows: int, directory: Path) -> Path:
-    """A recording of many rows, made of copies of some."""
-    features = tuple(Feature(f"f{index}", topic="state", index=index) for index in range(WIDTH))
-    block = min(rows, 10_000)
-    states = np.random.default_rng(0).normal(size=(block, WIDTH))
-    with RecordingWriter(directory, features, ["action"]) as writer:
-        for number, state in enumerate(states.tolist()):
-            action = ACTIONS[number * 7 % len(ACTIONS)]
-            writer.write(Row(number * 10**7, "action", action, None, tuple(state)))
-    # The later half of the rows, before which all labels were introduced.
-    content = writer.path.read_bytes()[-(block // 2) * record_type(WIDTH).itemsize :]
-    with writer.path.open("ab") as file:
-        for _ in range((rows - block) // (block // 2)):
-            file.write(content)
-    return writer.path
 
 
 def as_csv(path: Path, rows: int) -> Path:
@@ -241,7 +277,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--rows", type=int, default=5_000_000)
-    parser.add_argument("--only", default="kills,load,cpu,read")
+    parser.add_argument("--only", default="kills,load,freezes,relearn,cpu,read")
     parser.add_argument("--memory", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.memory:
@@ -250,6 +286,8 @@ def main() -> int:
     trials: dict[str, Callable[[Path], list[Figure]]] = {
         "kills": lambda directory: kills(options.kills, directory),
         "load": lambda directory: load(options.seconds, directory),
+        "freezes": lambda directory: freezes(options.seconds, directory),
+        "relearn": lambda directory: relearn(options.seconds, directory),
         "cpu": lambda directory: cpu(options.rounds, directory),
         "read": lambda directory: read(options.rows, options.rounds, directory),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import random
 import shutil
 import sys
@@ -20,14 +21,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Soaks, prints a table and writes the figures.
 
     Returns:
-        The exit code: 1 where anything got lost.
+        The exit code: 0 where nothing was lost, 1 where anything was.
     """
     options = _parser().parse_args(arguments)
     seed = random.SystemRandom().randrange(10**6) if options.seed is None else options.seed
     plan = Plan(60 * options.minutes, seed, options.state_rate, options.tick_rate)
     directory = Path(tempfile.mkdtemp(prefix="rebt_ros_soak_"))
     print(f"seed {seed}; {options.minutes:g} minutes; files in {directory}", flush=True)
-    began = time.monotonic()
+    began, load = time.monotonic(), os.getloadavg()[0]
 
     def tell(what: str) -> None:
         if options.verbose:
@@ -35,14 +36,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     ledger = run(directory, plan, tell)
     report = {"seed": seed, "minutes": options.minutes} | ledger.report()
+    report["load"] = {"before": load, "after": os.getloadavg()[0], "cores": os.cpu_count()}
     print(_table(ledger))
     if options.output is not None:
         options.output.parent.mkdir(parents=True, exist_ok=True)
         options.output.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     if report["losses"]:
-        print(f"the files stay in {directory}; --seed {seed} does the same again")
+        print(f"FAILED: {report['losses']} losses; seed {seed}, the files stay in {directory}")
         return 1
     shutil.rmtree(directory)
+    print(f"PASSED: nothing was lost; seed {seed}")
     return 0
 
 

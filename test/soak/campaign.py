@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray
 from fuzz import corpus
+from recorder_trials import cpu_seconds
 from ros_processes import LATCHED, Peer, own_domain, values_of
 from std_msgs.msg import Float64MultiArray, String
 
@@ -61,7 +62,9 @@ class Soak:
         self.directory = directory
         self.demonstrations = directory / "demonstrations"
         parameters: dict[str, dict[str, object]] = {
-            "recorder": {"demonstrations": self.demonstrations},
+            # What is lost on the way of a busy machine is sent again every three seconds, and may
+            # be lost again.
+            "recorder": {"demonstrations": self.demonstrations, "state_wait": 30.0},
             "learner": {
                 "demonstrations": self.demonstrations,
                 "output": directory / "learned",
@@ -81,16 +84,12 @@ class Soak:
         self._marks: tuple[int, int] | None = None
         """Commands heard and sent when the executor rested last, in the same life."""
         self._disabled_since: float | None = None
-        # What the recorder has said last.
-        self._late = 0
-        self._recorded = Path()
         peer.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_report, 10)
         peer.node.create_subscription(String, "behavior_tree", self._on_tree, LATCHED)
         self._next_watch = 0.0
 
     def begin(self) -> None:
-        """Starts everything."""
-        self.robot.tell("pause")
+        """Starts everything, while the robot moves."""
         for name in _TASKS:
             self.fleet.start(name)
         self.trees = self.peer.connect(String, "behavior_tree", LATCHED)
@@ -98,9 +97,7 @@ class Soak:
         self.actions = self.peer.connect(String, "action")
         for name in _TASKS:
             self.status(name)
-        self.wait(_DISCOVERY)
-        self.robot.tell("resume")
-        self.trees.publish(String(data=self.documents[0]))
+        self.publish_good_tree()
         self.expect_rows()
         self._enable_fresh()
 
@@ -132,6 +129,30 @@ class Soak:
                 self.ledger.lose("hangs", f"waited {_PATIENCE:.0f} s in vain for {what}")
                 return None
             self._meanwhile()
+
+    def expect_relearn(self, call: Any, what: str = "the answer to a relearn") -> None:
+        """Waits for the answer of ~/relearn.
+
+        Learning stands back for all else, and on a busy machine it is slow: it hangs where it has
+        no more of the processor's time for so long, or has had so much of it.
+        """
+        used, since = self._learning_time(), time.monotonic()
+        first = used
+        while not call.done() and time.monotonic() - since < _PATIENCE:
+            self._meanwhile()
+            now = self._learning_time()
+            if now != used and now - first < _PATIENCE:
+                used, since = now, time.monotonic()
+        self.expect(call.done, what)
+
+    def _learning_time(self) -> float:
+        """What the learning process has had of the processor (seconds); 0 if there is none."""
+        status = self.peer.diagnostics.get("learner: learning")
+        pid = values_of(status)["learning process"] if status else ""
+        try:
+            return cpu_seconds(int(pid))
+        except (ValueError, OSError):
+            return 0.0
 
     @contextlib.contextmanager
     def forgiving(self, *errors: type[Exception]) -> Iterator[None]:
@@ -182,10 +203,6 @@ class Soak:
                 path = Path(values["demonstration"]).resolve()
                 if rows:
                     self.ledger.acknowledge(path, rows)
-                late = int(values.get("late action", 0))
-                if late > self._late:
-                    self.ledger.late |= {path, self._recorded}
-                self._late, self._recorded = late, path
             elif status.name == "executor: execution":
                 longest = float(values_of(status)["longest tick (ms)"])
                 self.ledger.raise_to("longest_tick_ms", longest)
@@ -215,6 +232,10 @@ class Soak:
 
     # --- the executor -------------------------------------------------------------------------
 
+    def publish_good_tree(self) -> None:
+        """What an executor that starts later hears from here, where the learner has no tree."""
+        self.trees.publish(String(data=self.documents[0]))
+
     def restart(self, name: str) -> None:
         """Starts a node that has ended; waits until it does its work."""
         if name == "executor":
@@ -224,10 +245,6 @@ class Soak:
             self._marks = None
         if name == "learner":
             self._published.clear()
-        if name == "recorder":
-            # Until recorder and robot know each other the middleware may deliver states seconds
-            # late, and actions that overtake them are recorded with an earlier state.
-            self.robot.tell("pause")
         self.fleet.start(name)
         self.status(name)
         match name:
@@ -236,8 +253,7 @@ class Soak:
             case "learner" if self._tree:
                 self._expect_tree()
             case "recorder":
-                self.wait(_DISCOVERY)
-                self.robot.tell("resume")
+                # The robot has gone on meanwhile.
                 self.expect_rows()
 
     def _enable_fresh(self) -> None:

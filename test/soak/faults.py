@@ -55,7 +55,7 @@ def kill_learning(soak: Soak, random: Random) -> str:
     if pid.isdecimal():
         with soak.forgiving(ProcessLookupError):
             os.kill(int(pid), signal.SIGKILL)
-    soak.expect(call.done, "the answer to a relearn whose process was killed")
+    soak.expect_relearn(call, "the answer to a relearn whose process was killed")
     soak.note_tree(call)
     return "SIGKILL of the learning process"
 
@@ -64,9 +64,9 @@ def relearn(soak: Soak, random: Random) -> str:
     """Asks to learn; at times twice at once."""
     call = soak.peer.begin("/learner/relearn")
     second = soak.peer.begin("/learner/relearn") if random.random() < 0.5 else None
-    soak.expect(call.done, "the answer to a relearn")
+    soak.expect_relearn(call)
     if second is not None:
-        soak.expect(second.done, "the answer to a second relearn")
+        soak.expect_relearn(second, "the answer to a second relearn")
         soak.note_tree(second)
     soak.note_tree(call)
     return "relearn" if second is None else "relearn, asked for twice"
@@ -79,7 +79,7 @@ def cancel_relearn(soak: Soak, random: Random) -> str:
     names = dict(soak.peer.node.get_service_names_and_types())
     if "/learner/cancel" in names:
         soak.expect(soak.peer.begin("/learner/cancel").done, "the answer to a cancel")
-    soak.expect(call.done, "the answer to a relearn that was cancelled")
+    soak.expect_relearn(call, "the answer to a relearn that was cancelled")
     soak.note_tree(call)
     return "cancel of a relearn" if "/learner/cancel" in names else "relearn"
 
@@ -95,6 +95,8 @@ def malformed_trees(soak: Soak, random: Random) -> str:
         except DocumentError:
             soak.trees.publish(String(data=text))
             soak.wait(0.02)
+    # A topic keeps the last document only, and an executor that starts later must get a tree.
+    soak.publish_good_tree()
     return f"{_ROW} malformed trees"
 
 
@@ -157,6 +159,16 @@ def full_disk(soak: Soak, random: Random) -> str:
     return "disk that takes nothing"
 
 
+def freeze_recorder(soak: Soak, random: Random) -> str:
+    """Its process stands still until the transport has no room and drops what the robot sends."""
+    pid = soak.fleet.pid("recorder")
+    os.kill(pid, signal.SIGSTOP)
+    soak.wait(random.uniform(1.0, 4.0))
+    os.kill(pid, signal.SIGCONT)
+    soak.expect_rows()
+    return "frozen recorder"
+
+
 def stale_state(soak: Soak, random: Random) -> str:
     """The robot falls silent: the executor waits, and goes on by itself."""
     soak.robot.tell("pause")
@@ -212,6 +224,7 @@ FAULTS: Final[tuple[Callable[[Soak, Random], str], ...]] = (
     malformed_states,
     malformed_actions,
     full_disk,
+    freeze_recorder,
     stale_state,
     disable,
     new_demonstration,

@@ -26,9 +26,6 @@ class Ledger:
     acknowledged: dict[Path, int] = field(default_factory=dict)
     """Rows that the recorder has said are in a file."""
 
-    late: set[Path] = field(default_factory=set)
-    """Recordings of which the recorder has said that actions came late."""
-
     def lose(self, kind: str, what: str, count: int = 1) -> None:
         """Notes a loss."""
         self.losses[kind] += count

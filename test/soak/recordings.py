@@ -36,7 +36,7 @@ def audit(directory: Path, ledger: Ledger, blocks: int) -> None:
         if len(demonstration) < wanted:
             missing = wanted - len(demonstration)
             ledger.lose("acknowledged rows", f"{missing} of {wanted} in {path.name}", missing)
-        _audit_rows(demonstration, ledger, block_of, seen, path in ledger.late)
+        _audit_rows(demonstration, ledger, block_of, seen)
     ledger.figures["rows"] = rows
     ledger.figures["demonstrations"] = len(files)
 
@@ -46,7 +46,6 @@ def _audit_rows(
     ledger: Ledger,
     block_of: dict[float, int],
     seen: set[int],
-    late: bool,
 ) -> None:
     before: int | None = None
     for row, (state, code) in enumerate(
@@ -57,16 +56,10 @@ def _audit_rows(
         if block is None or tuple(state) != values_from(state[0]):
             ledger.lose("mixed rows", f"{where} has values of several states")
             continue
-        mistaken = demonstration.actions[code] != action_in(state)
-        if late and (block == before or mistaken):
-            # Said by the recorder, which takes an action with the state of its arrival.
-            ledger.figures["late_rows"] = ledger.figures.get("late_rows", 0) + 1
-            before = block
-            continue
         if block == before:
             ledger.lose("late states", f"{where} has the state of the row before")
             continue
-        if mistaken:
+        if demonstration.actions[code] != action_in(state):
             ledger.lose("mixed rows", f"{where} has the action of another state")
         if block in seen:
             ledger.lose("doubled rows", where)
