@@ -20,12 +20,13 @@ from rebt_ros.algorithms.rules import FactoredRule, Rule
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.logic.conditions import deciding
-from rebt_ros.logic.dnf import FALSE, Dnf, conditions_of
+from rebt_ros.logic.dnf import Dnf, conditions_of
 from rebt_ros.logic.domain import infeasible, spelled_out
-from rebt_ros.logic.factoring import Factored, factor, pull_out_common
-from rebt_ros.logic.float_reduction import float_reduction
+from rebt_ros.logic.factoring import Factored, factored, named, pulled_out
+from rebt_ros.logic.float_reduction import implied_literals, reduced
 from rebt_ros.logic.intervals import with_intervals
-from rebt_ros.logic.minimize import minimize
+from rebt_ros.logic.minimize import minimized_cover
+from rebt_ros.logic.numbered import Codes, Cover, Numbering
 
 #: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and
 #: entanglement make espresso take minutes there.
@@ -66,20 +67,27 @@ def reduced_tree(
         root: Kind of the root node.
     """
     leaves = sum(len(rule.dnf) for rule in rules)
-    conditions = conditions_of(_union(rule.dnf for rule in rules))
-    by_domain = reductions.domain and leaves <= MOST_LEAVES_BY_DOMAIN
-    impossible = infeasible(conditions) if by_domain else FALSE
-    outside = [spelled_out(rule.dnf, conditions) if by_domain else rule.dnf for rule in rules]
+    numbering = Numbering(conditions_of(_union(rule.dnf for rule in rules)))
+    implied = implied_literals(numbering.conditions)
+    inside = [numbering.cover(rule.dnf) for rule in rules]
+    impossible: list[Codes] = []
+    outside = inside
+    if reductions.domain and leaves <= MOST_LEAVES_BY_DOMAIN:
+        impossible = numbering.cover(infeasible(numbering.conditions))
+        outside = [numbering.cover(spelled_out(rule.dnf, numbering.conditions)) for rule in rules]
 
     @cache
     def child(rule: int, earlier: frozenset[int]) -> nodes.Node:
         later = [one for one in range(len(rules)) if one != rule and one not in earlier]
-        minimized = minimize(
-            rules[rule].dnf,
-            dont_care=_union((*(rules[one].dnf for one in sorted(earlier)), impossible)),
-            off=_union(outside[one] for one in later),
+        minimized = minimized_cover(
+            inside[rule],
+            dont_care=[*_joined(inside, sorted(earlier)), *impossible],
+            off=_joined(outside, later),
         )
-        return _child(rules[rule].actions, float_reduction(minimized), reductions)
+        parts = (factored if reductions.repeated_factoring else pulled_out)(
+            reduced(minimized, implied)
+        )
+        return _child(rules[rule].actions, named(parts, numbering), reductions)
 
     if reductions.priority and root is Root.SELECTOR:
         order = (
@@ -93,8 +101,13 @@ def reduced_tree(
     return with_root(root, trees)
 
 
-def _child(actions: tuple[nodes.Action, ...], dnf: Dnf, reductions: Reductions) -> nodes.Node:
-    condition = factor(dnf) if reductions.repeated_factoring else pull_out_common(dnf)
+def _joined(covers: Sequence[Cover], chosen: Iterable[int]) -> list[Codes]:
+    return [codes for one in chosen for codes in covers[one]]
+
+
+def _child(
+    actions: tuple[nodes.Action, ...], condition: Factored, reductions: Reductions
+) -> nodes.Node:
     if reductions.intervals:
         condition = with_intervals(condition)
     labels = tuple(action.label for action in actions)
