@@ -60,8 +60,8 @@ def minimized_cover(on: Cover, dont_care: Cover = (), off: Cover | None = None) 
         return [()] if on else []
     if off is not None and not off:
         return [()]
-    given = chain(on, dont_care, off or ())
-    vocabulary = tuple(dict.fromkeys(code >> 1 for codes in given for code in codes))
+    given = dict.fromkeys(chain.from_iterable(chain(on, dont_care, off or ())))
+    vocabulary = tuple(dict.fromkeys(code >> 1 for code in given))
     place = {condition: place for place, condition in enumerate(vocabulary)}
     cover = [(_cube(codes, place), (_ON,)) for codes in on]
     cover += [(_cube(codes, place), (_DONT_CARE,)) for codes in dont_care]
