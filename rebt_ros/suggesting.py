@@ -20,7 +20,7 @@ from rebt_ros.algorithms.suggestions import (
 )
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Suggestion
-from rebt_ros.decision_tree.training import TrainedTree, fit
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.options import LearnOptions
 from rebt_ros.routines.finding import FoundRoutine, find_routines
@@ -50,6 +50,7 @@ def suggest(
     options: LearnOptions,
     routines: Sequence[FoundRoutine] = (),
     demonstrated: Demonstrated | None = None,
+    fitted: FittedTree | None = None,
 ) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
     """What to offer: PSA nodes of the tree, and what a LAT-augmented tree tells about sequences.
 
@@ -61,23 +62,23 @@ def suggest(
         routines: What `routines_of` found in the table.
         demonstrated: What `demonstrated_in` makes of the table, which saves time where several
             trees are learned from it.
+        fitted: A tree of the same rows that may test LAT, if there is one: it saves a fit.
 
     Returns:
         At most twelve suggestions, routines first, then the best supported (all of them in the
         paper's mode), and notes on what was left out.
     """
     psa_rules = reduce_floats(logic_minimizer(dt_to_rules_psa(trained.tree, options.delta)))
-    with_lat = (
-        trained
-        if trained.uses_last_action
-        else fit(
+    with_lat = trained
+    if not trained.uses_last_action:
+        fitted = fitted or fit(
             table,
             last_action=True,
             max_depth=options.max_depth,
             random_state=options.random_state,
             upsample=options.upsample,
-        ).at(ccp_alpha)
-    )
+        )
+        with_lat = fitted.at(ccp_alpha)
     rules = dt_to_rules_psa(with_lat.tree, options.delta)
     inv_set = build_inv_set(rules)
     lat_trees = gen_lat_trees(
