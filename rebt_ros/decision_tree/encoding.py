@@ -66,8 +66,12 @@ def columns(table: DemonstrationTable, last_action: bool) -> tuple[Number | Indi
     return tuple(asked)
 
 
-def encode(table: DemonstrationTable, last_action: bool, rows: slice = slice(None)) -> Float32Array:
+def encode(
+    table: DemonstrationTable, last_action: bool, rows: slice = slice(None), spare: int = 0
+) -> Float32Array:
     """The matrix to train on and predict from, shape (rows, columns), of all rows or a stretch.
+
+    Behind its rows there can be some to spare, which are zero.
 
     Where there is nothing to learn from, it has one column that tells nothing, as scikit-learn
     wants at least one.
@@ -78,7 +82,8 @@ def encode(table: DemonstrationTable, last_action: bool, rows: slice = slice(Non
     width = sum(widths) + (len(table.actions) if last_action else 0)
     # Filled in place: large tables are held once.  Column by column, as trees are fitted.
     states = table.states[rows]
-    matrix = np.zeros((len(states), max(width, 1)), dtype=np.float32, order="F")
+    whole = np.zeros((len(states) + spare, max(width, 1)), dtype=np.float32, order="F")
+    matrix = whole[: len(states)]
     end = 0
     for index, (feature, its) in enumerate(zip(table.features, widths, strict=True)):
         values = states[:, index]
@@ -93,7 +98,7 @@ def encode(table: DemonstrationTable, last_action: bool, rows: slice = slice(Non
             _one_hot(values, matrix[:, start:end])
     if last_action:
         encode_last(matrix, table.last[rows], len(table.actions))
-    return matrix
+    return whole
 
 
 def encode_last(matrix: Float32Array, last: IntArray, actions: int) -> None:

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from sklearn.tree import DecisionTreeClassifier
 
-from rebt_ros.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree.nodes import Action
 from rebt_ros.decision_tree.encoding import Indicator, Number, columns, encode, encode_last
 from rebt_ros.decision_tree.pruning import PruningPath, pruning_path
@@ -184,9 +184,15 @@ class _Parts:
         self._table, self._parts, self._options = table, parts, options
         # LAT of a part differs where rows before are missing: those rows are appended.
         changed = [_changed(table, part) if options.last_action else _NO_ROWS for part in parts]
-        self._matrix = _with_changed(encode(table, options.last_action), changed, table)
-        rows = np.concatenate([np.arange(len(table)), *(rows for rows, _ in changed)])
-        self._chosen = table.chosen[rows]
+        again, last = (np.concatenate(one) for one in zip(_NO_ROWS, *changed, strict=True))
+        self._matrix = encode(table, options.last_action, spare=len(again))
+        if len(again):
+            appended = self._matrix[len(table) :]
+            appended[:] = self._matrix[again]
+            encode_last(appended, last, len(table.actions))
+        # Small numbers: scikit-learn sorts them, and copies them more than once.
+        kind = np.min_scalar_type(len(table.actions))
+        self._chosen = np.append(table.chosen, table.chosen[again]).astype(kind)
         ends = np.cumsum([len(table), *(len(rows) for rows, _ in changed)])
         self._instead = [
             (rows, slice(start, end))
@@ -218,18 +224,6 @@ def _changed(table: DemonstrationTable, part: BoolArray) -> _Changed:
     rows = np.flatnonzero(part)
     differing = last != table.last[rows]
     return rows[differing], last[differing]
-
-
-def _with_changed(
-    matrix: Float32Array, changed: Sequence[_Changed], table: DemonstrationTable
-) -> Float32Array:
-    """The matrix with the rows of all parts whose LAT differs there."""
-    rows, last = (np.concatenate(one) for one in zip(*changed, strict=True))
-    if not len(rows):
-        return matrix
-    more = matrix[rows]
-    encode_last(more, last, len(table.actions))
-    return np.asfortranarray(np.concatenate([matrix, more]))
 
 
 @dataclass(frozen=True, slots=True)
