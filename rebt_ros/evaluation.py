@@ -19,6 +19,7 @@ import numpy as np
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import (
+    Plan,
     States,
     choose,
     last_action_column,
@@ -53,12 +54,15 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
     if not reach:
         return teacher_forced_choices(tree, table)
     situations, of_row = _situations(tree, table)
+    plan, actions = Plan(tree, table.features), actions_of(table)
     # Each history that comes up is evaluated once: there are far fewer than rows.
     choices: dict[tuple[str, ...], list[int]] = {}
 
     def after(recent: tuple[str, ...]) -> list[int]:
         if recent not in choices:
-            choices[recent] = _choices_after(recent, tree, situations).tolist()
+            history = last_action_of(ActionHistory(reversed(recent)))
+            states = States(situations.features, situations.states, history)
+            choices[recent] = plan.choose(actions, states).tolist()
         return choices[recent]
 
     chosen: list[int] = []
@@ -79,14 +83,6 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
 def agreement(chosen: IntArray, table: DemonstrationTable) -> float | None:
     """Share of the rows in which `chosen` is what the demonstrator did; None without rows."""
     return float(np.mean(chosen == table.chosen)) if len(table) else None
-
-
-def _choices_after(
-    recent: tuple[str, ...], tree: nodes.Node, table: DemonstrationTable
-) -> IntArray:
-    history = ActionHistory(reversed(recent))
-    states = States(table.features, table.states, last_action_of(history))
-    return choose(tree, actions_of(table), states)
 
 
 def _situations(tree: nodes.Node, table: DemonstrationTable) -> tuple[DemonstrationTable, IntArray]:
