@@ -115,6 +115,13 @@ def _round_trips(peer: Peer, states: int) -> list[float]:
     publisher: Any = peer.connect(Float64MultiArray, "state")
     peer.wait_until(lambda: peer.node.count_publishers("command"))
     message = Float64MultiArray(data=[0.0, 0.0])
+
+    def answered() -> list[tuple[float, str]]:
+        publisher.publish(message)
+        return heard
+
+    # Until both have found each other, states or commands can get lost.
+    peer.wait_until(answered)
     trips = []
     for number in range(states + 20):
         wanted = number % 2
