@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -127,6 +128,22 @@ def test_streams_that_follow_each_other_are_recovered_exactly() -> None:
 
 def test_a_guard_of_two_alternatives_is_recovered_exactly() -> None:
     assert missed(EITHER_OR, find_routines(shown(EITHER_OR, 6000))) == []
+
+
+def test_sequences_of_which_one_always_follows_the_other_are_recovered_exactly() -> None:
+    root = group(
+        SEQUENCE,
+        group(REPEATER, above(1, 0.5), act(1)),
+        group(SEQUENCE, act(0), group(PSA, act(2), act(3))),
+        group(SEQUENCE, below(0, 0.6), act(4), act(2)),
+    )
+    assert missed(root, find_routines(shown(root, 12000))) == []
+
+
+def test_no_two_routines_differ_in_their_thresholds_alone() -> None:
+    for routines in (found(), one_after_the_other()):
+        shapes = {re.sub(r"(≤|>) [\d.]+", r"\1", one_line(one.subtree)) for one in routines}
+        assert len(shapes) == len(routines)
 
 
 def test_conditions_have_the_thresholds_and_directions_that_decided() -> None:

@@ -21,7 +21,7 @@ from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, Literal, Threshold
 from rebt_ros.routines.corpus import LONGEST_WORD, Corpus, corpus
 from rebt_ros.routines.guards import Guard, guard, holds
-from rebt_ros.routines.likelihood import _PRICE, Model
+from rebt_ros.routines.likelihood import _PRICE, Model, Models
 from rebt_ros.routines.moments import Word, moments
 from rebt_ros.routines.moves import MOST_STATES, neighbours
 from rebt_ros.routines.program import (
@@ -215,6 +215,24 @@ def test_rounds_of_one_call_or_of_several_are_the_same(program: Program, shown: 
     one_by_one.fit(1)
     one_by_one.fit(2)
     assert one_by_one.fit(1) == pytest.approx(Model(program, read).fit(4))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(programs, min_size=1, max_size=4), st.lists(words, min_size=1, max_size=6))
+def test_a_program_is_worth_the_same_whatever_it_is_read_together_with(
+    together: list[Program], shown: list[Word]
+) -> None:
+    read = corpus_of(*shown)
+    alone = [Model(program, read).fit(3) for program in together]
+    assert Models(together, read).fit(3).tolist() == pytest.approx(alone, rel=1e-4, abs=1e-3)
+
+
+def test_rare_actions_that_no_program_does_are_improbable_and_no_more() -> None:
+    frequent, rare = (A,) * 9, (B, C, D) * 3
+    read = corpus_of(*[frequent] * 5000, rare)
+    models = Models([(sequence(A),), (sequence(A), sequence(B, C, D))], read)
+    worth = models.fit(20)
+    assert np.isfinite(worth).all()
 
 
 @settings(max_examples=30, deadline=None)

@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.arrays import Float32Array, FloatArray, IntArray
 from rebt_ros.routines.moments import Moments, Word
 
 #: Different words that are read, those with the most rows.
 _MOST_WORDS = 120
 #: Actions of a word that are read.
 LONGEST_WORD = 9
-#: Probability that a row belongs to nothing that the program knows.
-_NOISE = 0.01
+#: Share of an action's rows at least, so that noise of rare ones is not improbable beyond measure.
+_LEAST_SHARE = 0.001
 
 
 class Level(NamedTuple):
@@ -29,9 +29,9 @@ class Level(NamedTuple):
     """Moments whose word ends there, shape (n,)."""
     cut: FloatArray
     """Moments whose word goes on, but is read no further, shape (n,)."""
-    noise: FloatArray
-    """Probability that the last action belongs to nothing, shape (n,)."""
-    children: FloatArray
+    noise: Float32Array
+    """Share of the last action, by which noise is it, shape (n,)."""
+    children: Float32Array
     """Which of them each beginning of the level before begins, 0 or 1, shape (n before, n)."""
 
 
@@ -43,6 +43,8 @@ class Corpus:
     levels: tuple[Level, ...]
     moments: float
     """How many moments have these words."""
+    rows: float
+    """How many actions of them are read."""
     followers: FloatArray
     """How often an action follows another one, shape (actions, actions)."""
     share: FloatArray
@@ -65,11 +67,12 @@ def corpus(moments: Moments) -> Corpus:
         read.setdefault(word[:LONGEST_WORD], [0.0, 0.0])[len(word) > LONGEST_WORD] += count
         np.add.at(seen, list(word), count)
         np.add.at(followers, (list(word[:-1]), list(word[1:])), count)
-    share = seen / seen.sum()
+    share = np.maximum(seen / seen.sum(), _LEAST_SHARE)
     return Corpus(
         actions,
         tuple(_levels(read, share)),
         sum(map(sum, read.values())),
+        sum(len(word) * sum(counts) for word, counts in read.items()),
         followers,
         share,
         float(followers.sum() / (seen.sum() - actions)),
@@ -84,10 +87,12 @@ def _levels(read: dict[Word, list[float]], share: FloatArray) -> list[Level]:
         ends = np.array([read.get(word, [0.0, 0.0]) for word in here])
         parent = np.array([before[word[:-1]] for word in here], dtype=np.int64)
         action = np.array([word[-1] for word in here], dtype=np.int64)
-        children = np.zeros((len(before), len(here)))
+        children = np.zeros((len(before), len(here)), np.float32)
         children[parent, np.arange(len(here))] = 1
         levels.append(
-            Level(parent, action, ends[:, 0], ends[:, 1], _NOISE * share[action], children)
+            Level(
+                parent, action, ends[:, 0], ends[:, 1], share[action].astype(np.float32), children
+            )
         )
         before = {word: place for place, word in enumerate(here)}
     return levels

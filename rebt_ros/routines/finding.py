@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,12 +10,14 @@ import numpy as np
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Literal, Threshold
 from rebt_ros.routines.corpus import LONGEST_WORD, corpus
 from rebt_ros.routines.guards import Guard, guard, holds
-from rebt_ros.routines.likelihood import Model, State
+from rebt_ros.routines.likelihood import Model
 from rebt_ros.routines.moments import Moments, moments
-from rebt_ros.routines.program import Place, Routine
+from rebt_ros.routines.program import Place, Step
 from rebt_ros.routines.search import programs
+from rebt_ros.routines.streams import State
 
 #: Share of the rows that must follow another one in the same moment for routines to be looked for,
 #: and how many such rows there must be.
@@ -57,21 +59,106 @@ def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:
         table: The rows that were learned from.
 
     Returns:
-        Those that explain the most rows first; routines of the best program come before the others.
+        Each once, whatever its thresholds: routines of the best program, those that explain the
+        most rows first; then its Sequences cut in two before a step with a guard; routines of the
+        next programs; and Sequences cut elsewhere.
     """
     shown = moments(table)
     together = shown.rows - len(shown)
     if together < max(_FEWEST_TOGETHER, _LEAST_TOGETHER * len(table)) or len(shown.actions) < 2:
         return ()
     read = corpus(shown)
-    offered: dict[nodes.Node, FoundRoutine] = {}
+    readings = []
     for program in programs(shown, read)[:_MOST_PROGRAMS]:
         model = Model(program, read)
         model.fit(_THOROUGH)
-        found = _Reading(model, shown, table.features).routines(table.channel)
-        for routine in sorted(found, key=lambda one: -one.rows):
-            offered.setdefault(routine.subtree, routine)
-    return tuple(offered.values())
+        reading = _Reading(model, shown, table.features)
+        readings.append(sorted(reading.routines(table.channel), key=lambda one: -one.rows))
+    best = readings[0]
+    offered = [one.whole for one in best]
+    offered += [part for one in best for part in one.parts(guarded=True)]
+    offered += [one.whole for reading in readings[1:] for one in reading]
+    offered += [part for one in best for part in one.parts(guarded=False)]
+    different: dict[object, FoundRoutine] = {}
+    for routine in offered:
+        if len(routine.subtree.children) > 1:
+            different.setdefault(_gist(routine.subtree), routine)
+    return tuple(different.values())
+
+
+@dataclass(frozen=True, slots=True)
+class _ReadStep:
+    """A step as it is offered."""
+
+    guard: tuple[nodes.Node, ...]
+    action: nodes.Node
+    support: int
+    """How often the rarest of its actions was done in it."""
+    rows: int
+
+
+@dataclass(frozen=True, slots=True)
+class _ReadRoutine:
+    """A routine as it is offered."""
+
+    steps: tuple[_ReadStep, ...]
+    repeated: bool
+
+    @property
+    def rows(self) -> int:
+        """How many rows it explains."""
+        return sum(step.rows for step in self.steps)
+
+    @property
+    def whole(self) -> FoundRoutine:
+        """All of it."""
+        return _found(self.steps, nodes.Repeater if self.repeated else _sequence)
+
+    def parts(self, *, guarded: bool) -> Iterator[FoundRoutine]:
+        """What comes before a step, and what begins with it.
+
+        Sequences of which one always follows the other do the same as one Sequence, so that it
+        cannot be told where one ends.
+
+        Args:
+            guarded: Whether the step has a guard.
+        """
+        if self.repeated:
+            return
+        for cut in range(1, len(self.steps)):
+            if bool(self.steps[cut].guard) == guarded:
+                yield _found(self.steps[:cut], _sequence)
+                yield _found(self.steps[cut:], _sequence)
+
+
+def _found(
+    steps: tuple[_ReadStep, ...],
+    kind: Callable[[tuple[nodes.Node, ...]], nodes.Sequence | nodes.Repeater],
+) -> FoundRoutine:
+    children = tuple(node for step in steps for node in (*step.guard, step.action))
+    support = min(step.support for step in steps)
+    return FoundRoutine(kind(children), support, sum(step.rows for step in steps))
+
+
+def _gist(node: nodes.Node) -> object:
+    """What is the same in routines that differ in thresholds and the order of conditions alone."""
+    match node:
+        case nodes.Condition(literal=Literal(condition=Threshold(feature=name), positive=positive)):
+            return name, positive
+        case nodes.Selector(children=children):
+            return frozenset(_gist(child) for child in children)
+        case nodes.Sequence(children=children) | nodes.Repeater(children=children):
+            parts: list[object] = [type(node)]
+            conditions: set[object] = set()
+            for child in children:
+                if isinstance(child, nodes.Condition | nodes.Selector):
+                    conditions.add(_gist(child))
+                else:
+                    parts += [frozenset(conditions), child]
+                    conditions = set()
+            return tuple(parts)
+        case _:
+            return node
 
 
 #: Where a stream begins.
@@ -168,33 +255,25 @@ class _Reading:
             place.routine + 1 < len(routines)
         )
 
-    def routines(self, channel: str) -> Iterator[FoundRoutine]:
-        """The routines that say more than that an action is done."""
+    def routines(self, channel: str) -> Iterator[_ReadRoutine]:
+        """All routines of the program."""
         for stream, routines in enumerate(self._program):
             for number, routine in enumerate(routines):
-                children = self._children(stream, number, routine, channel)
-                if len(children) > 1:
-                    kind = nodes.Repeater if routine.rounds > 1 else _sequence
-                    rows = [
-                        self._rows.get((stream, Place(number, step), member), 0)
-                        for step, members in enumerate(routine.steps)
-                        for member in range(len(members))
-                    ]
-                    yield FoundRoutine(kind(children), min(rows), sum(rows))
-
-    def _children(
-        self, stream: int, number: int, routine: Routine, channel: str
-    ) -> tuple[nodes.Node, ...]:
-        children: list[nodes.Node] = []
-        for place, step in enumerate(routine.steps):
-            for clause in self._guard(stream, number, place):
-                conditions = tuple(nodes.Condition(literal) for literal in clause)
-                children.append(
-                    conditions[0] if len(conditions) == 1 else nodes.Selector(conditions)
+                steps = (
+                    self._step(stream, Place(number, step), members, channel)
+                    for step, members in enumerate(routine.steps)
                 )
-            actions = tuple(nodes.Action(self._shown.actions[one], channel) for one in step)
-            children.append(actions[0] if len(actions) == 1 else nodes.ParallelSelector(actions))
-        return tuple(children)
+                yield _ReadRoutine(tuple(steps), routine.rounds > 1)
+
+    def _step(self, stream: int, place: Place, members: Step, channel: str) -> _ReadStep:
+        guards: list[nodes.Node] = []
+        for clause in self._guard(stream, place.routine, place.step):
+            conditions = tuple(nodes.Condition(literal) for literal in clause)
+            guards.append(conditions[0] if len(conditions) == 1 else nodes.Selector(conditions))
+        actions = tuple(nodes.Action(self._shown.actions[one], channel) for one in members)
+        action = actions[0] if len(actions) == 1 else nodes.ParallelSelector(actions)
+        rows = [self._rows.get((stream, place, member), 0) for member in range(len(members))]
+        return _ReadStep(tuple(guards), action, min(rows), sum(rows))
 
     def _guard(self, stream: int, number: int, place: int) -> Guard:
         """What must hold before a step."""

@@ -6,7 +6,7 @@ from random import Random
 from typing import NamedTuple
 
 from rebt_ros.routines.corpus import Corpus
-from rebt_ros.routines.likelihood import Model
+from rebt_ros.routines.likelihood import Models
 from rebt_ros.routines.moments import Moments, Word
 from rebt_ros.routines.moves import MOST_STATES, neighbours
 from rebt_ros.routines.program import Program, Routine, Stream, states_needed, tidy
@@ -27,11 +27,13 @@ _LONGEST = 18
 #: Programs that are judged before the best of them is taken.
 _AT_ONCE = 40
 #: Rounds of expectation maximization: at first sight, and before a program is taken.
-_GLANCE, _LOOK = 1, 4
+_GLANCE, _LOOK = 1, 5
+#: Programs whose probabilities are learned together; more do not fit into the processor's cache.
+_TOGETHER = 8
 #: What a program must gain at first sight to be taken at once, and at a closer look, in nats.
 _PROMISING, _GAIN = -40.0, 3.0
-#: Programs that get a closer look when none was taken at once.
-_CLOSER = 8
+#: Programs that get a closer look when none was taken at once, and in the end.
+_CLOSER, _ALL = 8, 1000
 
 
 class _Judged(NamedTuple):
@@ -40,22 +42,16 @@ class _Judged(NamedTuple):
     score: float
     """In nats."""
     program: Program
-    model: Model
-
-    @property
-    def rank(self) -> tuple[float, Program]:
-        """Orders programs, those of one worth as well."""
-        return self.score, self.program
 
 
 def programs(moments: Moments, corpus: Corpus) -> list[Program]:
     """Programs that explain the moments, the best first."""
     rounds = _ROUNDS
-    begun = [_first(corpus), *_beginnings(moments, corpus, rounds)]
-    found = [_climb(_judge(one, corpus, _LOOK), corpus, rounds, _FEW) for one in begun]
-    found.sort(key=lambda one: one.rank, reverse=True)
+    begun = _judge([_first(corpus), *_beginnings(moments, corpus, rounds)], corpus, _LOOK)
+    found = [_climb(one, corpus, rounds, _FEW) for one in begun]
+    found.sort(reverse=True)
     found[:_FINALISTS] = [_climb(one, corpus, rounds, _MANY) for one in found[:_FINALISTS]]
-    best = max(found, key=lambda one: one.rank)
+    best = max(found)
     for _ in range(_RECOMBINATIONS):
         streams = dict.fromkeys(stream for one in found for stream in one.program)
         better = _recombined(best, list(streams), corpus)
@@ -63,14 +59,16 @@ def programs(moments: Moments, corpus: Corpus) -> list[Program]:
             break
         best = _climb(better, corpus, rounds, _MANY)
         found.append(best)
+    best = _climb(best, corpus, rounds, _MANY, _ALL)
+    found.append(best)
     for times in _OTHER_ROUNDS:
         program = _with_rounds(best.program, times)
         if program != best.program and states_needed(program) <= MOST_STATES:
-            other = _judge(program, corpus, _LOOK)
+            (other,) = _judge([program], corpus, _LOOK)
             if other.score > best.score + _GAIN:
                 best = _climb(other, corpus, times, _MANY)
                 found.append(best)
-    found.sort(key=lambda one: one.rank, reverse=True)
+    found.sort(reverse=True)
     return list(dict.fromkeys(one.program for one in found))
 
 
@@ -96,8 +94,8 @@ def _beginnings(moments: Moments, corpus: Corpus, rounds: int) -> list[Program]:
     longest = (word for _, word in sorted(often, key=lambda one: (-one[0], one[1])))
     folded = dict.fromkeys(tidy((fold(word, rounds),)) for word in longest)
     fitting = [one for one in folded if states_needed(one) <= MOST_STATES][:_CANDIDATES]
-    judged = sorted((_judge(one, corpus, _GLANCE).rank for one in fitting), reverse=True)
-    return [program for _, program in judged[:_BEGINNINGS]]
+    judged = sorted(_judge(fitting, corpus, _GLANCE), reverse=True)
+    return [one.program for one in judged[:_BEGINNINGS]]
 
 
 def _recombined(best: _Judged, streams: list[Stream], corpus: Corpus) -> _Judged | None:
@@ -109,12 +107,8 @@ def _recombined(best: _Judged, streams: list[Stream], corpus: Corpus) -> _Judged
         for place in range(len(program) + 1)
         for end in range(place, len(program) + 1)
     )
-    judged = [
-        _judge(one, corpus, _GLANCE)
-        for one in changed
-        if one != program and states_needed(one) <= MOST_STATES
-    ]
-    return _better_than(best, judged, corpus)
+    others = [one for one in changed if one != program and states_needed(one) <= MOST_STATES]
+    return _better_than(best, _judge(others, corpus, _GLANCE), corpus)
 
 
 def fold(word: Word, rounds: int) -> Stream:
@@ -135,8 +129,16 @@ Routine(rounds=1, steps=((3,),)))
     return (Routine(1, tuple((action,) for action in word)),) if word else ()
 
 
-def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
-    """Takes better neighbours until there is none, or enough have been looked at."""
+def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int, closer: int = _CLOSER) -> _Judged:
+    """Takes better neighbours until there is none, or enough have been looked at.
+
+    Args:
+        best: Where to begin.
+        corpus: What is explained.
+        rounds: How often is repeated what is repeated.
+        most: Programs that are looked at.
+        closer: Of these, those that get a closer look when none was taken at once.
+    """
     draw = Random(0)
     seen = {best.program}
     looked = 0
@@ -151,27 +153,34 @@ def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
             some, waiting = waiting[:_AT_ONCE], waiting[_AT_ONCE:]
             seen.update(some)
             looked += len(some)
-            judged = [_judge(one, corpus, _GLANCE) for one in some]
+            judged = _judge(some, corpus, _GLANCE)
             glanced += judged
-            first = max(judged, key=lambda one: one.rank)
+            first = max(judged)
             if first.score > best.score + _PROMISING:
                 better = _better_than(best, [first], corpus)
-        better = better or _better_than(best, glanced, corpus)
+        better = better or _better_than(best, glanced, corpus, closer)
         if better is None:
             break
         best = better
     return best
 
 
-def _better_than(best: _Judged, judged: list[_Judged], corpus: Corpus) -> _Judged | None:
+def _better_than(
+    best: _Judged, judged: list[_Judged], corpus: Corpus, closer: int = _CLOSER
+) -> _Judged | None:
     """The first of the most promising programs that is better at a closer look."""
-    for one in sorted(judged, key=lambda one: one.rank, reverse=True)[:_CLOSER]:
-        closer = one._replace(score=one.model.fit(_LOOK))
-        if closer.score > best.score + _GAIN:
-            return closer
+    promising = [one.program for one in sorted(judged, reverse=True)[:closer]]
+    for begin in range(0, len(promising), _TOGETHER):
+        better = max(_judge(promising[begin : begin + _TOGETHER], corpus, _LOOK))
+        if better.score > best.score + _GAIN:
+            return better
     return None
 
 
-def _judge(program: Program, corpus: Corpus, rounds: int) -> _Judged:
-    model = Model(program, corpus)
-    return _Judged(model.fit(rounds), program, model)
+def _judge(programs: list[Program], corpus: Corpus, rounds: int) -> list[_Judged]:
+    """What programs are worth after some rounds of expectation maximization."""
+    judged: list[_Judged] = []
+    for begin in range(0, len(programs), _TOGETHER):
+        some = programs[begin : begin + _TOGETHER]
+        judged += map(_Judged, Models(some, corpus).fit(rounds).tolist(), some)
+    return judged
