@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from rebt_ros.algorithms.lat_occurrences import rows
 from rebt_ros.algorithms.lat_trees import Demonstrated, gen_lat_trees
 from rebt_ros.algorithms.re_bt_espresso import build_inv_set, logic_minimizer, reduce_floats
@@ -32,6 +34,10 @@ _MOST_ROUTINES = 8
 #: rows are samples, and an action that is done for long is no loop.
 _MOST_LOOPS, _LOOPS_BESIDE_ROUTINES = 24, 4
 
+#: Rows in which LAT paths are counted: what has not occurred in so many is no habit, and counting
+#: nested loops takes longer than learning does in many more.
+_MOST_ROWS = 100_000
+
 
 def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[FoundRoutine, ...]:
     """Routines in a table, if they are asked for; they are the same at all pruning levels."""
@@ -39,8 +45,11 @@ def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[Found
 
 
 def demonstrated_in(table: DemonstrationTable) -> Demonstrated:
-    """What was done in a table, row by row; it is the same at all pruning levels."""
-    return Demonstrated(rows(table))
+    """What was done in a table, row by row; it is the same at all pruning levels.
+
+    Of a large table, only in its first rows.
+    """
+    return Demonstrated(rows(table.where(np.arange(len(table)) < _MOST_ROWS)))
 
 
 def suggest(
@@ -103,6 +112,8 @@ def suggest(
     left_out += len(routines) - len(found)
     offered = (*found, *offered)
     notes = (f"{left_out} more, less supported suggestions are left out",) if left_out else ()
+    if len(table) > _MOST_ROWS:
+        notes = (*notes, f"suggestions were counted in the first {_MOST_ROWS} rows alone")
     return offered, notes
 
 
