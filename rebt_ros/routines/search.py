@@ -32,8 +32,8 @@ _GLANCE, _LOOK = 1, 5
 _TOGETHER = 8
 #: What a program must gain at first sight to be taken at once, and at a closer look, in nats.
 _PROMISING, _GAIN = -40.0, 3.0
-#: Programs that get a closer look when none was taken at once, and in the end.
-_CLOSER, _ALL = 8, 1000
+#: Programs that get a closer look when none was taken at once.
+_CLOSER = 8
 
 
 class _Judged(NamedTuple):
@@ -59,8 +59,6 @@ def programs(moments: Moments, corpus: Corpus) -> list[Program]:
             break
         best = _climb(better, corpus, rounds, _MANY)
         found.append(best)
-    best = _climb(best, corpus, rounds, _MANY, _ALL)
-    found.append(best)
     for times in _OTHER_ROUNDS:
         program = _with_rounds(best.program, times)
         if program != best.program and states_needed(program) <= MOST_STATES:
@@ -129,16 +127,8 @@ Routine(rounds=1, steps=((3,),)))
     return (Routine(1, tuple((action,) for action in word)),) if word else ()
 
 
-def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int, closer: int = _CLOSER) -> _Judged:
-    """Takes better neighbours until there is none, or enough have been looked at.
-
-    Args:
-        best: Where to begin.
-        corpus: What is explained.
-        rounds: How often is repeated what is repeated.
-        most: Programs that are looked at.
-        closer: Of these, those that get a closer look when none was taken at once.
-    """
+def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
+    """Takes better neighbours until there is none, or enough have been looked at."""
     draw = Random(0)
     seen = {best.program}
     looked = 0
@@ -158,22 +148,19 @@ def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int, closer: int = 
             first = max(judged)
             if first.score > best.score + _PROMISING:
                 better = _better_than(best, [first], corpus)
-        better = better or _better_than(best, glanced, corpus, closer)
+        better = better or _better_than(best, glanced, corpus)
         if better is None:
             break
         best = better
     return best
 
 
-def _better_than(
-    best: _Judged, judged: list[_Judged], corpus: Corpus, closer: int = _CLOSER
-) -> _Judged | None:
+def _better_than(best: _Judged, judged: list[_Judged], corpus: Corpus) -> _Judged | None:
     """The first of the most promising programs that is better at a closer look."""
-    promising = [one.program for one in sorted(judged, reverse=True)[:closer]]
-    for begin in range(0, len(promising), _TOGETHER):
-        better = max(_judge(promising[begin : begin + _TOGETHER], corpus, _LOOK))
-        if better.score > best.score + _GAIN:
-            return better
+    promising = [one.program for one in sorted(judged, reverse=True)[:_CLOSER]]
+    for one in _judge(promising, corpus, _LOOK):
+        if one.score > best.score + _GAIN:
+            return one
     return None
 
 
