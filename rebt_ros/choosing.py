@@ -43,6 +43,8 @@ class Policy:
     """The pruning levels that were chosen from; None where there was no choice."""
     reasons: tuple[str, ...]
     """A sentence for each choice."""
+    with_last_action: FittedTree | None = None
+    """The tree of all rows that may test LAT, if there is one; `fitted` is it, or is preferred."""
 
 
 class _Steps:
@@ -71,7 +73,7 @@ def choose(
     """
     if len(table) < _FEWEST_ROWS:
         return _unjudged(table, options)
-    judged, level, reasons = _last_action_and_level(table, options, _Steps(advance))
+    judged, level, reasons, with_lat = _last_action_and_level(table, options, _Steps(advance))
     ccp_alpha = options.ccp_alpha
     if ccp_alpha is None:
         ccp_alpha = float(level.ccp_alphas[level.chosen])
@@ -82,7 +84,7 @@ def choose(
             f"({level.means[level.best]:.1%})."
         )
     psa, reason = _choose_psa(judged, ccp_alpha, options)
-    return Policy(judged.fitted, ccp_alpha, psa, level, (*reasons, reason))
+    return Policy(judged.fitted, ccp_alpha, psa, level, (*reasons, reason), with_lat)
 
 
 def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.Node:
@@ -139,7 +141,7 @@ def _unjudged(table: DemonstrationTable, options: LearnOptions) -> Policy:
 
 def _last_action_and_level(
     table: DemonstrationTable, options: LearnOptions, step: Callable[[], None]
-) -> tuple[CrossValidation, JudgedLevels, list[str]]:
+) -> tuple[CrossValidation, JudgedLevels, list[str], FittedTree | None]:
     def cross_validation(last_action: bool) -> CrossValidation:
         return CrossValidation(
             table,
@@ -155,11 +157,11 @@ def _last_action_and_level(
 
     if options.last_action is Use.ALWAYS:
         with_lat = cross_validation(last_action=True)
-        return with_lat, run(with_lat), []
+        return with_lat, run(with_lat), [], with_lat.fitted
     without = cross_validation(last_action=False)
     plain = run(without)
     if options.last_action is Use.NEVER:
-        return without, plain, []
+        return without, plain, [], None
     with_lat = cross_validation(last_action=True)
     forced = with_lat.teacher_forced().means.max()
     if forced <= plain.means[plain.best]:
@@ -171,8 +173,10 @@ def _last_action_and_level(
         reason = f"{own.means[own.best]:.1%} with its own history"
     compared = f"({reason}, {plain.means[plain.best]:.1%} without)"
     if own is None or own.means[own.best] <= plain.means[plain.best]:
-        return without, plain, [f"The last action taken does not raise agreement {compared}."]
-    return with_lat, own, [f"Testing the last action taken raises agreement {compared}."]
+        reasons = [f"The last action taken does not raise agreement {compared}."]
+        return without, plain, reasons, with_lat.fitted
+    reasons = [f"Testing the last action taken raises agreement {compared}."]
+    return with_lat, own, reasons, with_lat.fitted
 
 
 def _choose_psa(

@@ -12,11 +12,14 @@ agreement, own-history
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import (
+    Plan,
     States,
     choose,
     last_action_column,
@@ -24,7 +27,10 @@ from rebt_ros.behavior_tree.prediction import (
 )
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import LastActionIs
+from rebt_ros.logic.conditions import LastActionIs, Literal
+
+#: Conditions that are told apart by one number each; with more, the kinds are counted anew.
+_MOST_BITS = 30
 
 
 def actions_of(table: DemonstrationTable) -> tuple[nodes.Action, ...]:
@@ -47,19 +53,31 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
     reach = _reach(tree)
     if not reach:
         return teacher_forced_choices(tree, table)
-    # Each history that comes up is evaluated once, on all rows: there are far fewer than rows.
-    choices: dict[tuple[str, ...], IntArray] = {}
-    chosen = np.full(len(table), NO_ACTION, dtype=np.int64)
-    recent: tuple[str, ...] = ()
-    for row, starts in enumerate(_starts(table)):
-        recent = _recent_at(row, table) if starts else recent
+    situations, of_row = _situations(tree, table)
+    plan, actions = Plan(tree, table.features), actions_of(table)
+    # Each history that comes up is evaluated once: there are far fewer than rows.
+    choices: dict[tuple[str, ...], list[int]] = {}
+
+    def after(recent: tuple[str, ...]) -> list[int]:
         if recent not in choices:
-            choices[recent] = _choices_after(recent, tree, table)
-        choice = int(choices[recent][row])
-        chosen[row] = choice
-        if choice != NO_ACTION:
-            recent = _after(recent, table.actions[choice], reach)
-    return chosen
+            history = last_action_of(ActionHistory(reversed(recent)))
+            states = States(situations.features, situations.states, history)
+            choices[recent] = plan.choose(actions, states).tolist()
+        return choices[recent]
+
+    chosen: list[int] = []
+    for start, end in pairwise((*np.flatnonzero(_starts(table)).tolist(), len(table))):
+        recent = _recent_at(start, table)
+        chooses, newest = after(recent), NO_ACTION
+        for situation in of_row[start:end].tolist():
+            choice = chooses[situation]
+            chosen.append(choice)
+            # What was done just now is the first in the history already.
+            if choice not in (newest, NO_ACTION):
+                newest = choice
+                recent = _after(recent, table.actions[choice], reach)
+                chooses = after(recent)
+    return np.array(chosen, dtype=np.int64)
 
 
 def agreement(chosen: IntArray, table: DemonstrationTable) -> float | None:
@@ -67,12 +85,25 @@ def agreement(chosen: IntArray, table: DemonstrationTable) -> float | None:
     return float(np.mean(chosen == table.chosen)) if len(table) else None
 
 
-def _choices_after(
-    recent: tuple[str, ...], tree: nodes.Node, table: DemonstrationTable
-) -> IntArray:
-    history = ActionHistory(reversed(recent))
-    states = States(table.features, table.states, last_action_of(history))
-    return choose(tree, actions_of(table), states)
+def _situations(tree: nodes.Node, table: DemonstrationTable) -> tuple[DemonstrationTable, IntArray]:
+    """A row of each kind that the tree can tell apart but for LAT, and the kind of each row."""
+    states = States(table.features, table.states, lambda condition: False)
+    tested = dict.fromkeys(
+        one.literal.condition
+        for one in nodes.conditions(tree)
+        if not isinstance(one.literal.condition, LastActionIs)
+    )
+    kind = np.zeros(len(table), dtype=np.int64)
+    for place, condition in enumerate(tested, start=1):
+        kind = 2 * kind + states.satisfy(Literal(condition))
+        if place % _MOST_BITS == 0:
+            kind = np.unique(kind, return_inverse=True)[1]
+    _, first, of_row = np.unique(kind, return_index=True, return_inverse=True)
+    chosen = np.zeros(len(table), dtype=bool)
+    chosen[first] = True
+    order = np.empty(len(first), dtype=np.int64)
+    order[np.argsort(first)] = np.arange(len(first))
+    return table.where(chosen), order[of_row]
 
 
 def _recent_at(row: int, table: DemonstrationTable) -> tuple[str, ...]:

@@ -204,7 +204,14 @@ def learn_from(
     learned_from = table if options.refit else shown
     progress("suggesting", 0.9)
     routines = routines_of(learned_from, options)
-    suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options, routines)
+    suggestions, notes = suggest(
+        learned_from,
+        trained,
+        policy.ccp_alpha,
+        options,
+        routines,
+        fitted=None if options.refit else policy.with_last_action,
+    )
     if options.lags and not evenly_spaced(table):
         notes = (*notes, _UNEVEN.format(table.channel))
     tree, suggestions = accept(tree, suggestions, options)

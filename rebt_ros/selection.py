@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from rebt_ros.arrays import FloatArray, IntArray
-from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit_all
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit_parts
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.table import DemonstrationTable
 
@@ -95,8 +94,9 @@ class CrossValidation:
         fold = folds(table)
         numbers = np.unique(fold)
         trees: list[FittedTree] = []
-        for tree in fit_all(
-            [lambda: table, *(partial(_outside, table, fold, number) for number in numbers)],
+        for tree in fit_parts(
+            table,
+            [fold != number for number in numbers],
             last_action=last_action,
             max_depth=max_depth,
             random_state=random_state,
@@ -149,10 +149,6 @@ class CrossValidation:
             found.append(scores[level])
         self._step()
         return found
-
-
-def _outside(table: DemonstrationTable, fold: IntArray, number: int) -> DemonstrationTable:
-    return table.where(fold != number)
 
 
 def folds(table: DemonstrationTable) -> IntArray:

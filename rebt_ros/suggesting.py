@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from rebt_ros.algorithms.lat_occurrences import rows
 from rebt_ros.algorithms.lat_trees import Demonstrated, gen_lat_trees
 from rebt_ros.algorithms.re_bt_espresso import build_inv_set, logic_minimizer, reduce_floats
@@ -20,7 +22,7 @@ from rebt_ros.algorithms.suggestions import (
 )
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Suggestion
-from rebt_ros.decision_tree.training import TrainedTree, fit
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.options import LearnOptions
 from rebt_ros.routines.finding import FoundRoutine, find_routines
@@ -32,6 +34,10 @@ _MOST_ROUTINES = 8
 #: rows are samples, and an action that is done for long is no loop.
 _MOST_LOOPS, _LOOPS_BESIDE_ROUTINES = 24, 4
 
+#: Rows in which LAT paths are counted: what has not occurred in so many is no habit, and counting
+#: nested loops takes longer than learning does in many more.
+_MOST_ROWS = 100_000
+
 
 def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[FoundRoutine, ...]:
     """Routines in a table, if they are asked for; they are the same at all pruning levels."""
@@ -39,8 +45,11 @@ def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[Found
 
 
 def demonstrated_in(table: DemonstrationTable) -> Demonstrated:
-    """What was done in a table, row by row; it is the same at all pruning levels."""
-    return Demonstrated(rows(table))
+    """What was done in a table, row by row; it is the same at all pruning levels.
+
+    Of a large table, only in its first rows.
+    """
+    return Demonstrated(rows(table.where(np.arange(len(table)) < _MOST_ROWS)))
 
 
 def suggest(
@@ -50,6 +59,7 @@ def suggest(
     options: LearnOptions,
     routines: Sequence[FoundRoutine] = (),
     demonstrated: Demonstrated | None = None,
+    fitted: FittedTree | None = None,
 ) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
     """What to offer: PSA nodes of the tree, and what a LAT-augmented tree tells about sequences.
 
@@ -61,23 +71,23 @@ def suggest(
         routines: What `routines_of` found in the table.
         demonstrated: What `demonstrated_in` makes of the table, which saves time where several
             trees are learned from it.
+        fitted: A tree of the same rows that may test LAT, if there is one: it saves a fit.
 
     Returns:
         At most twelve suggestions, routines first, then the best supported (all of them in the
         paper's mode), and notes on what was left out.
     """
     psa_rules = reduce_floats(logic_minimizer(dt_to_rules_psa(trained.tree, options.delta)))
-    with_lat = (
-        trained
-        if trained.uses_last_action
-        else fit(
+    with_lat = trained
+    if not trained.uses_last_action:
+        fitted = fitted or fit(
             table,
             last_action=True,
             max_depth=options.max_depth,
             random_state=options.random_state,
             upsample=options.upsample,
-        ).at(ccp_alpha)
-    )
+        )
+        with_lat = fitted.at(ccp_alpha)
     rules = dt_to_rules_psa(with_lat.tree, options.delta)
     inv_set = build_inv_set(rules)
     lat_trees = gen_lat_trees(
@@ -102,6 +112,8 @@ def suggest(
     left_out += len(routines) - len(found)
     offered = (*found, *offered)
     notes = (f"{left_out} more, less supported suggestions are left out",) if left_out else ()
+    if len(table) > _MOST_ROWS:
+        notes = (*notes, f"suggestions were counted in the first {_MOST_ROWS} rows alone")
     return offered, notes
 
 

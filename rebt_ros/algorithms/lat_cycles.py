@@ -7,15 +7,16 @@ that is left, one that a depth-first search meets.
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from itertools import islice
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import networkx as nx
+import numpy as np
+import numpy.typing as npt
 
 from rebt_ros.algorithms.lat_graph import CycleNode, GraphNode, LatGraph
 from rebt_ros.algorithms.lat_occurrences import Occurrences
@@ -29,6 +30,8 @@ MOST_LOOPS = 256
 _Cycle: TypeAlias = tuple[int, ...]
 #: Which nodes a run can be of: several where an action is in several PSA groups.
 _Owners: TypeAlias = tuple[int, ...]
+#: Positions of owners, one for each run of a demonstration.
+_Runs: TypeAlias = "npt.NDArray[np.unsignedinteger[Any]]"
 _T = TypeVar("_T")
 
 
@@ -229,17 +232,18 @@ class _Work:
 class _Steps:
     """The demonstrations as nodes that follow each other, neighbours differ.
 
-    Inside a cycle node nothing new begins.  Which nodes a run can be of is a letter, so that the
-    demonstrations are texts, in which loops are cut out and counted quickly.
+    Inside a cycle node nothing new begins.  Which nodes a run can be of is a number, so that loops
+    are cut out of arrays, and counted as bytes.
     """
 
     def __init__(self, shown: Iterable[list[_Owners]]) -> None:
         demonstrations = list(shown)
         distinct = {owners for demonstration in demonstrations for owners in demonstration}
         self._owners = sorted(distinct)
-        letters = _letters(self._owners)
-        self._texts = [
-            _contracted("".join(map(letters.__getitem__, demonstration)))
+        places = _places(self._owners)
+        kind = np.uint16 if len(places) <= np.iinfo(np.uint16).max else np.uint32
+        self._runs = [
+            _contracted(np.array([places[owners] for owners in demonstration], dtype=kind))
             for demonstration in demonstrations
         ]
 
@@ -248,33 +252,35 @@ class _Steps:
 
         The smallest nodes come first.
         """
-        nobody = _letters(self._owners).get((), "")
-        taken: Counter[str] = Counter()
-        for text in self._texts:
-            taken.update(_ways_back(text, nobody))
+        nobody = _places(self._owners).get((), len(self._owners))
+        taken: Counter[bytes] = Counter()
+        for runs in self._runs:
+            taken.update(_ways_back(runs, nobody))
         loops: Counter[tuple[_Owners, ...]] = Counter()
         for way, times in taken.items():
-            smallest = way.index(min(way))
-            turned = way[smallest:] + way[:smallest]
-            loops[tuple(self._owners[ord(letter)] for letter in turned)] += times
+            places = np.frombuffer(way, dtype=self._runs[0].dtype).tolist()
+            smallest = places.index(min(places))
+            turned = places[smallest:] + places[:smallest]
+            loops[tuple(self._owners[place] for place in turned)] += times
         return loops
 
     def collapse(self, cycle: _Cycle, number: int) -> None:
         """Replaces the nodes of the cycle by the one with the number."""
         renamed = [_renamed(owners, cycle, number) for owners in self._owners]
         self._owners = sorted(set(renamed))
-        letters = _letters(self._owners)
-        table = {place: letters[owners] for place, owners in enumerate(renamed)}
-        self._texts = [_contracted(text.translate(table)) for text in self._texts]
+        places = _places(self._owners)
+        place = np.array([places[owners] for owners in renamed])
+        self._runs = [_contracted(place[runs].astype(runs.dtype)) for runs in self._runs]
 
 
-def _letters(owners: list[_Owners]) -> dict[_Owners, str]:
-    """Letters in the order of what they stand for."""
-    return {one: chr(place) for place, one in enumerate(owners)}
+def _places(owners: list[_Owners]) -> dict[_Owners, int]:
+    return {one: place for place, one in enumerate(owners)}
 
 
-def _contracted(text: str) -> str:
-    return re.sub(r"(?s)(.)\1+", r"\1", text)
+def _contracted(runs: _Runs) -> _Runs:
+    differs = np.ones(len(runs), dtype=bool)
+    differs[1:] = runs[1:] != runs[:-1]
+    return runs[differs]
 
 
 def _renamed(owners: _Owners, cycle: _Cycle, number: int) -> _Owners:
@@ -282,22 +288,25 @@ def _renamed(owners: _Owners, cycle: _Cycle, number: int) -> _Owners:
     return owners if len(kept) == len(owners) else (*kept, number)
 
 
-def _ways_back(text: str, nobody: str) -> Iterator[str]:
-    """Parts of the text from a letter to its next occurrence in which no letter is twice.
+def _ways_back(runs: _Runs, nobody: int) -> Iterator[bytes]:
+    """Parts of the runs from one to its next occurrence in which none is twice, as bytes.
 
     A run of nobody's breaks off every way.
     """
-    last_at: dict[str, int] = {}
-    distinct_since = 0
-    for place, letter in enumerate(text):
-        if letter == nobody:
-            distinct_since = place + 1
-            continue
-        before = last_at.get(letter, -1)
-        if before >= distinct_since:
-            yield text[before:place]
-            distinct_since = before + 1
-        last_at[letter] = place
+    count = len(runs)
+    before = np.full(count, -1)
+    order = np.argsort(runs, kind="stable")
+    again = runs[order[1:]] == runs[order[:-1]]
+    before[order[1:][again]] = order[:-1][again]
+    free = runs == nobody
+    before[free] = -1
+    # From where on no run is twice before the place at hand.
+    since = np.maximum.accumulate(np.where(free, np.arange(count), before) + 1)
+    distinct_since = np.append(0, since[:-1])[:count]
+    ends = np.flatnonzero((before >= distinct_since) & ~free)
+    size, data = runs.itemsize, runs.tobytes()
+    for start, end in zip((before[ends] * size).tolist(), (ends * size).tolist(), strict=True):
+        yield data[start:end]
 
 
 def _most_frequent(counted: Counter[tuple[_T, ...]]) -> list[tuple[tuple[_T, ...], int]]:

@@ -20,12 +20,13 @@ from rebt_ros.algorithms.rules import FactoredRule, Rule
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.logic.conditions import deciding
-from rebt_ros.logic.dnf import FALSE, Dnf, conditions_of
+from rebt_ros.logic.dnf import Dnf, conditions_of
 from rebt_ros.logic.domain import infeasible, spelled_out
-from rebt_ros.logic.factoring import Factored, factor, pull_out_common
-from rebt_ros.logic.float_reduction import float_reduction
-from rebt_ros.logic.intervals import with_intervals
-from rebt_ros.logic.minimize import minimize
+from rebt_ros.logic.factoring import Factored, Parts, factored, named, pulled_out
+from rebt_ros.logic.float_reduction import implied_literals, reduced
+from rebt_ros.logic.intervals import enclosing_literals, intervals_among, with_intervals
+from rebt_ros.logic.minimize import minimized_cover
+from rebt_ros.logic.numbered import Codes, Cover, Numbering
 
 #: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and
 #: entanglement make espresso take minutes there.
@@ -34,6 +35,9 @@ MOST_LEAVES_BY_DOMAIN = 40
 #: Up to so many rules the best order is found, then the order that is best step by step; yet more
 #: rules are ordered by their number of leaves, as a search would take a minimization per pair.
 _MOST_RULES_IN_ANY_ORDER, _MOST_RULES_STEP_BY_STEP = 6, 16
+
+#: Nodes of any rule that has a condition: a Sequence of the condition and an action.
+_LEAST_COST = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,35 +70,93 @@ def reduced_tree(
         root: Kind of the root node.
     """
     leaves = sum(len(rule.dnf) for rule in rules)
-    conditions = conditions_of(_union(rule.dnf for rule in rules))
-    by_domain = reductions.domain and leaves <= MOST_LEAVES_BY_DOMAIN
-    impossible = infeasible(conditions) if by_domain else FALSE
-    outside = [spelled_out(rule.dnf, conditions) if by_domain else rule.dnf for rule in rules]
+    numbering = Numbering(conditions_of(_union(rule.dnf for rule in rules)))
+    implied = implied_literals(numbering.conditions)
+    inside = [numbering.cover(rule.dnf) for rule in rules]
+    impossible: list[Codes] = []
+    outside = inside
+    if reductions.domain and leaves <= MOST_LEAVES_BY_DOMAIN:
+        impossible = numbering.cover(infeasible(numbering.conditions))
+        outside = [numbering.cover(spelled_out(rule.dnf, numbering.conditions)) for rule in rules]
 
     @cache
-    def child(rule: int, earlier: frozenset[int]) -> nodes.Node:
+    def condition(rule: int, earlier: frozenset[int]) -> Parts:
         later = [one for one in range(len(rules)) if one != rule and one not in earlier]
-        minimized = minimize(
-            rules[rule].dnf,
-            dont_care=_union((*(rules[one].dnf for one in sorted(earlier)), impossible)),
-            off=_union(outside[one] for one in later),
+        minimized = minimized_cover(
+            inside[rule],
+            dont_care=[*_joined(inside, sorted(earlier)), *impossible],
+            off=_joined(outside, later),
         )
-        return _child(rules[rule].actions, float_reduction(minimized), reductions)
+        return (factored if reductions.repeated_factoring else pulled_out)(
+            reduced(minimized, implied)
+        )
 
-    if reductions.priority and root is Root.SELECTOR:
+    def cost(rule: int, earlier: frozenset[int]) -> int:
+        return size_of(condition(rule, earlier), len(rules[rule].actions), enclosing)
+
+    enclosing = enclosing_literals(numbering.conditions) if reductions.intervals else None
+    order: Sequence[int] = range(len(rules))
+    by_priority = reductions.priority and root is Root.SELECTOR
+    if by_priority:
         order = (
-            _best_order(len(rules), lambda rule, earlier: nodes.size(child(rule, earlier)))
+            _best_order(len(rules), cost)
             if len(rules) <= _MOST_RULES_STEP_BY_STEP
-            else sorted(range(len(rules)), key=lambda rule: len(rules[rule].dnf))
+            else sorted(order, key=lambda rule: len(rules[rule].dnf))
         )
-        trees = [child(rule, frozenset(order[:place])) for place, rule in enumerate(order)]
-    else:
-        trees = [child(rule, frozenset()) for rule in range(len(rules))]
+    trees = []
+    for place, rule in enumerate(order):
+        found = condition(rule, frozenset(order[:place]) if by_priority else frozenset())
+        trees.append(_child(rules[rule].actions, named(found, numbering), reductions))
     return with_root(root, trees)
 
 
-def _child(actions: tuple[nodes.Action, ...], dnf: Dnf, reductions: Reductions) -> nodes.Node:
-    condition = factor(dnf) if reductions.repeated_factoring else pull_out_common(dnf)
+def size_of(condition: Parts, actions: int, enclosing: Sequence[int] | None) -> int:
+    """Nodes of a rule's tree, which is not built to be counted.
+
+    Args:
+        condition: Of the rule; float-reduced.
+        actions: How many it triggers.
+        enclosing: From `enclosing_literals`; None where thresholds do not become intervals.
+    """
+    children, found = _extent(condition, enclosing)
+    return _under_one(children + 1, found + actions + (actions > 1))
+
+
+def _extent(condition: Parts, enclosing: Sequence[int] | None) -> tuple[int, int]:
+    """The trees of a condition, and the nodes of all of them together."""
+    children = len(condition.common)
+    if enclosing is not None:
+        children -= intervals_among(condition.common, enclosing)
+    if not condition.alternatives:
+        return children, children
+    below = sum(_under_one(*_extent(one, enclosing)) for one in condition.alternatives)
+    return children + 1, children + 1 + below
+
+
+def _under_one(children: int, found: int) -> int:
+    """The nodes with the Sequence over them, which a single child does without."""
+    return found if children == 1 else found + 1
+
+
+def _cheapest(
+    left: Sequence[int], earlier: frozenset[int], cost: Callable[[int, frozenset[int]], int]
+) -> int:
+    """The first of those that cost least."""
+    costs: dict[int, int] = {}
+    for rule in left:
+        costs[rule] = cost(rule, earlier)
+        if costs[rule] == _LEAST_COST:
+            break
+    return min(costs, key=costs.__getitem__)
+
+
+def _joined(covers: Sequence[Cover], chosen: Iterable[int]) -> list[Codes]:
+    return [codes for one in chosen for codes in covers[one]]
+
+
+def _child(
+    actions: tuple[nodes.Action, ...], condition: Factored, reductions: Reductions
+) -> nodes.Node:
     if reductions.intervals:
         condition = with_intervals(condition)
     labels = tuple(action.label for action in actions)
@@ -112,8 +174,8 @@ def _best_order(rules: int, cost: Callable[[int, frozenset[int]], int]) -> tuple
         order: tuple[int, ...] = ()
         while len(order) < rules:
             earlier = frozenset(order)
-            left = (rule for rule in range(rules) if rule not in earlier)
-            order = (*order, min(left, key=lambda rule: cost(rule, earlier)))
+            left = [rule for rule in range(rules) if rule not in earlier]
+            order = (*order, _cheapest(left, earlier, cost))
         return order
     # What follows a set of rules does not depend on their order: dynamic programming over sets.
     best: dict[frozenset[int], tuple[int, tuple[int, ...]]] = {frozenset(): (0, ())}

@@ -115,7 +115,7 @@ def condition_trees(condition: Factored, inv_set: frozenset[Literal]) -> list[no
 
 def _literal_tree(literal: Literal, inv_set: frozenset[Literal]) -> nodes.Node:
     """Lines 17 to 23."""
-    if literal in inv_set:
+    if inv_set and literal in inv_set:
         return nodes.Inverter(nodes.Condition(~literal))
     return nodes.Condition(literal)
 

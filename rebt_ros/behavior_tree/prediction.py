@@ -5,11 +5,14 @@ Actions count as succeeding at once and memory as empty, so that the result is t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache, partial, reduce
+from operator import and_
 from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree import nodes
@@ -25,6 +28,8 @@ from rebt_ros.logic.conditions import (
     Threshold,
 )
 
+#: What a state tells alone.
+StateCondition: TypeAlias = Threshold | Interval | IsTrue | HasCategory
 #: Tells in which of the states a LAT condition holds, or for all of them at once.
 LastActionTest: TypeAlias = Callable[[LastActionIs], BoolArray | bool]
 
@@ -40,76 +45,57 @@ def last_action_of(history: ActionHistory) -> LastActionTest:
     return lambda condition: history.before(*condition.deciding) == condition.action
 
 
-#: Rows that are evaluated at a time: few enough to stay in a processor's cache, condition after
-#: condition, and many enough for what Python does once per node not to matter.
-_ROWS_AT_A_TIME = 16_384
+#: Rows that are evaluated at a time: so many that what Python does once per node does not matter,
+#: and few enough for a column of them to stay in a processor's cache.
+_ROWS_AT_A_TIME = 131_072
+#: Rows whose columns are copied at a time, which stay in the cache meanwhile.
+_ROWS_COPIED = 512
+#: Rows that one number of a mask stands for.
+_BITS = 64
+
+#: A bit per row, 64 to a number; behind the last row there are zeros.
+_Mask: TypeAlias = "npt.NDArray[np.uint64]"
+#: Where a node succeeds, of the rows in which it is reached.
+_Step: TypeAlias = Callable[["_Part", _Mask], _Mask]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class States:
-    """Rows of states on which a tree is evaluated; remembers the conditions it has tested."""
+    """Rows of states on which a tree is evaluated."""
 
     features: tuple[Feature, ...]
     values: FloatArray
     """Shape (rows, features): numbers, 0 or 1, positions in a feature's categories, or NaN."""
     last_action: LastActionTest
-    _tested: dict[Literal, BoolArray] = field(default_factory=dict, init=False)
 
     def __len__(self) -> int:
         return len(self.values)
 
     def satisfy(self, literal: Literal) -> BoolArray:
         """Where the literal holds, shape (rows,)."""
-        found = self._tested.get(literal)
-        if found is None:
-            found = (
-                ~self.satisfy(~literal) if not literal.positive else self._test(literal.condition)
-            )
-            self._tested[literal] = found
-        return found
-
-    def parts(self) -> Iterator[tuple[slice, States]]:
-        """The rows in parts that are quick to evaluate, each with its place."""
-        if len(self) <= _ROWS_AT_A_TIME:
-            yield slice(0, len(self)), self
-            return
-        tested: dict[LastActionIs, BoolArray | bool] = {}
-
-        def last_action(condition: LastActionIs) -> BoolArray | bool:
-            if condition not in tested:
-                tested[condition] = self.last_action(condition)
-            return tested[condition]
-
-        for start in range(0, len(self), _ROWS_AT_A_TIME):
-            rows = slice(start, min(start + _ROWS_AT_A_TIME, len(self)))
-            # Column by column, as they are tested.
-            values = np.asfortranarray(self.values[rows])
-            yield rows, States(self.features, values, _in_part(last_action, rows))
-
-    def _test(self, condition: Condition) -> BoolArray:
+        condition = literal.condition
         if isinstance(condition, LastActionIs):
-            return np.broadcast_to(self.last_action(condition), len(self))
-        index, feature = next(
-            (index, one) for index, one in enumerate(self.features) if one.name == condition.feature
-        )
-        column: FloatArray = self.values[:, index]
-        match condition:
-            case Threshold(value=value):
-                return np.less_equal(column, value)
-            case Interval(above=above, at_most=at_most):
-                return np.less(above, column) & np.less_equal(column, at_most)
-            case IsTrue():
-                return np.equal(column, 1)
-            case HasCategory(category=category):
-                return np.equal(column, feature.categories.index(category))
+            holds = np.broadcast_to(self.last_action(condition), len(self))
+        else:
+            place = self.place(condition.feature)
+            holds = _test(condition, self.features[place], self.values[:, place])
+        return holds if literal.positive else ~holds
+
+    def place(self, feature: str) -> int:
+        """The column of a feature."""
+        return next(index for index, one in enumerate(self.features) if one.name == feature)
 
 
-def _in_part(last_action: LastActionTest, rows: slice) -> LastActionTest:
-    def test(condition: LastActionIs) -> BoolArray | bool:
-        found = last_action(condition)
-        return found if isinstance(found, bool) else found[rows]
-
-    return test
+def _test(condition: StateCondition, feature: Feature, column: FloatArray) -> BoolArray:
+    match condition:
+        case Threshold(value=value):
+            return np.less_equal(column, value)
+        case Interval(above=above, at_most=at_most):
+            return np.less(above, column) & np.less_equal(column, at_most)
+        case IsTrue():
+            return np.equal(column, 1)
+        case HasCategory(category=category):
+            return np.equal(column, feature.categories.index(category))
 
 
 def triggered(tree: nodes.Node, states: States) -> dict[nodes.Action, BoolArray]:
@@ -122,10 +108,11 @@ def triggered(tree: nodes.Node, states: States) -> dict[nodes.Action, BoolArray]
     Returns:
         One array of shape (rows,) per action.
     """
-    ticked = {action: np.zeros(len(states), dtype=bool) for action in nodes.actions(tree)}
-    for rows, part in states.parts():
-        in_part = {action: where[rows] for action, where in ticked.items()}
-        _tick(tree, part, np.ones(len(part), dtype=bool), in_part)
+    plan = Plan(tree, states.features)
+    ticked = {action: np.zeros(len(states), dtype=bool) for action in plan.actions}
+    for rows, in_part in plan.ticked(states):
+        for action, where in zip(plan.actions, in_part, strict=True):
+            ticked[action][rows] = where
     return ticked
 
 
@@ -141,49 +128,147 @@ def choose(tree: nodes.Node, actions: tuple[nodes.Action, ...], states: States) 
         Positions in `actions`, shape (rows,); `NO_ACTION` where the tree takes none of them.  Where
         a Parallel takes several, it is the first that the tree names.
     """
-    chosen = np.full(len(states), NO_ACTION, dtype=np.int64)
-    named = nodes.actions(tree)
-    for rows, part in states.parts():
-        ticked = {action: np.zeros(len(part), dtype=bool) for action in named}
-        _tick(tree, part, np.ones(len(part), dtype=bool), ticked)
-        # The first that is named is written last.
-        for action in reversed(named):
-            if action in actions:
-                np.putmask(chosen[rows], ticked[action], actions.index(action))
-    return chosen
+    return Plan(tree, states.features).choose(actions, states)
 
 
-def _tick(
-    node: nodes.Node,
-    states: States,
-    reached: BoolArray,
-    ticked: dict[nodes.Action, BoolArray],
-) -> BoolArray:
-    """Where the node succeeds, of the states in which it is reached."""
+class Plan:
+    """A tree that is made ready to be evaluated on many states of the same features, many times."""
+
+    def __init__(self, tree: nodes.Node, features: tuple[Feature, ...]) -> None:
+        self.actions = nodes.actions(tree)
+        """In the order in which the tree names them."""
+        conditions = dict.fromkeys(one.literal.condition for one in nodes.conditions(tree))
+        self._conditions = tuple(conditions)
+        place = {condition: number for number, condition in enumerate(conditions)}
+        acted = {action: number for number, action in enumerate(self.actions)}
+        self._root = _step(tree, place, acted)
+        # Of what is tested, the columns that are read.
+        by_name = {feature.name: number for number, feature in reversed([*enumerate(features)])}
+        read = {by_name[one.feature] for one in conditions if not isinstance(one, LastActionIs)}
+        self._columns = tuple(sorted(read))
+        self._row = {features[column].name: row for row, column in enumerate(self._columns)}
+        self._features = features
+
+    def choose(self, actions: tuple[nodes.Action, ...], states: States) -> IntArray:
+        """As the function of this name."""
+        chosen = np.full(len(states), NO_ACTION, dtype=np.int64)
+        code = [actions.index(one) if one in actions else None for one in self.actions]
+        for rows, ticked in self.ticked(states):
+            # The first that is named is written last.
+            for number, where in reversed([*zip(code, ticked, strict=True)]):
+                if number is not None:
+                    np.putmask(chosen[rows], where, number)
+        return chosen
+
+    def ticked(self, states: States) -> Iterator[tuple[slice, list[BoolArray]]]:
+        """In which rows each action is ticked, part by part of the rows."""
+        last = {
+            number: states.last_action(condition)
+            for number, condition in enumerate(self._conditions)
+            if isinstance(condition, LastActionIs)
+        }
+        columns = np.empty((len(self._columns), min(len(states), _ROWS_AT_A_TIME)))
+        for start in range(0, len(states), _ROWS_AT_A_TIME):
+            rows = slice(start, min(start + _ROWS_AT_A_TIME, len(states)))
+            count = rows.stop - start
+            _copy_columns(states.values[rows], self._columns, columns)
+            part = _Part(count, len(self.actions), partial(self._holds, columns, last, rows))
+            self._root(part, _packed(np.ones(count, dtype=bool)))
+            yield rows, [_unpacked(mask, count) for mask in part.ticked]
+
+    def _holds(
+        self,
+        columns: FloatArray,
+        last: Mapping[int, BoolArray | bool],
+        rows: slice,
+        number: int,
+    ) -> _Mask:
+        """Where a condition holds in a part of the rows."""
+        condition, count = self._conditions[number], rows.stop - rows.start
+        if isinstance(condition, LastActionIs):
+            found = last[number]
+            where = found[rows] if isinstance(found, np.ndarray) else np.full(count, found)
+            return _packed(where)
+        row = self._row[condition.feature]
+        feature = self._features[self._columns[row]]
+        return _packed(_test(condition, feature, columns[row, :count]))
+
+
+class _Part:
+    """Some rows while a tree is evaluated on them."""
+
+    def __init__(self, rows: int, actions: int, holds: Callable[[int], _Mask]) -> None:
+        words = -(-rows // _BITS)
+        self.ticked = [np.zeros(words, dtype=np.uint64) for _ in range(actions)]
+        """Where each action is ticked."""
+        self.holds = cache(holds)
+        """Where a condition holds, by its number."""
+
+
+def _copy_columns(values: FloatArray, chosen: tuple[int, ...], columns: FloatArray) -> None:
+    """Copies columns into rows, so that each is read in one go."""
+    everything = chosen == tuple(range(values.shape[1]))
+    for start in range(0, len(values), _ROWS_COPIED):
+        rows = values[start : start + _ROWS_COPIED]
+        columns[:, start : start + len(rows)] = (rows if everything else rows[:, chosen]).T
+
+
+def _packed(where: BoolArray) -> _Mask:
+    mask = np.zeros(-(-len(where) // _BITS), dtype=np.uint64)
+    mask.view(np.uint8)[: -(-len(where) // 8)] = np.packbits(where, bitorder="little")
+    return mask
+
+
+def _unpacked(mask: _Mask, rows: int) -> BoolArray:
+    return np.unpackbits(mask.view(np.uint8), count=rows, bitorder="little").view(np.bool_)
+
+
+def _step(
+    node: nodes.Node, place: Mapping[Condition, int], acted: Mapping[nodes.Action, int]
+) -> _Step:
+    """What a node does, with numbers instead of conditions and actions."""
     match node:
         case nodes.Condition(literal=literal):
-            return reached & states.satisfy(literal)
+            number = place[literal.condition]
+            if literal.positive:
+                return lambda part, reached: reached & part.holds(number)
+            return lambda part, reached: reached & ~part.holds(number)
         case nodes.Action():
-            where = ticked[node]
-            where |= reached
-            return reached
+            return partial(_act, acted[node])
         case nodes.Inverter(child=child):
-            return reached & ~_tick(child, states, reached, ticked)
+            inverted = _step(child, place, acted)
+            # What succeeds was reached, so that the rest is what differs.
+            return lambda part, reached: reached ^ inverted(part, reached)
         case nodes.Sequence(children=children) | nodes.Repeater(children=children):
-            for child in children:
-                reached = _tick(child, states, reached, ticked)
-                if not reached.any():
-                    break
-            return reached
+            return partial(_all_in_turn, [_step(child, place, acted) for child in children])
         case nodes.Selector(children=children) | nodes.ParallelSelector(children=children):
-            left = reached
-            for child in children:
-                left = left & ~_tick(child, states, left, ticked)
-                if not left.any():
-                    break
-            return reached & ~left
+            return partial(_first_in_turn, [_step(child, place, acted) for child in children])
         case nodes.Parallel(children=children):
-            results = [_tick(child, states, reached, ticked) for child in children]
-            for succeeded in results:
-                reached = reached & succeeded
-            return reached
+            return partial(_all_at_once, [_step(child, place, acted) for child in children])
+
+
+def _act(number: int, part: _Part, reached: _Mask) -> _Mask:
+    part.ticked[number] |= reached
+    return reached
+
+
+def _all_in_turn(steps: list[_Step], part: _Part, reached: _Mask) -> _Mask:
+    for step in steps:
+        reached = step(part, reached)
+        if not reached.any():
+            break
+    return reached
+
+
+def _first_in_turn(steps: list[_Step], part: _Part, reached: _Mask) -> _Mask:
+    left = reached
+    for step in steps:
+        left = left ^ step(part, left)
+        if not left.any():
+            break
+    return reached ^ left
+
+
+def _all_at_once(steps: list[_Step], part: _Part, reached: _Mask) -> _Mask:
+    results = [step(part, reached) for step in steps]
+    return reduce(and_, results, reached)

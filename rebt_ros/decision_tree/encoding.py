@@ -66,8 +66,12 @@ def columns(table: DemonstrationTable, last_action: bool) -> tuple[Number | Indi
     return tuple(asked)
 
 
-def encode(table: DemonstrationTable, last_action: bool) -> Float32Array:
-    """The matrix to train on and predict from, shape (rows, columns).
+def encode(
+    table: DemonstrationTable, last_action: bool, rows: slice = slice(None), spare: int = 0
+) -> Float32Array:
+    """The matrix to train on and predict from, shape (rows, columns), of all rows or a stretch.
+
+    Behind its rows there can be some to spare, which are zero.
 
     Where there is nothing to learn from, it has one column that tells nothing, as scikit-learn
     wants at least one.
@@ -76,11 +80,13 @@ def encode(table: DemonstrationTable, last_action: bool) -> Float32Array:
         len(one.categories) if one.kind is FeatureKind.CATEGORICAL else 1 for one in table.features
     ]
     width = sum(widths) + (len(table.actions) if last_action else 0)
-    # Filled in place: large tables are held once.
-    matrix = np.zeros((len(table), max(width, 1)), dtype=np.float32)
+    # Filled in place: large tables are held once.  Column by column, as trees are fitted.
+    states = table.states[rows]
+    whole = np.zeros((len(states) + spare, max(width, 1)), dtype=np.float32, order="F")
+    matrix = whole[: len(states)]
     end = 0
     for index, (feature, its) in enumerate(zip(table.features, widths, strict=True)):
-        values = table.states[:, index]
+        values = states[:, index]
         start, end = end, end + its
         if feature.kind is FeatureKind.NUMERIC:
             column = matrix[:, start]
@@ -91,8 +97,13 @@ def encode(table: DemonstrationTable, last_action: bool) -> Float32Array:
         else:
             _one_hot(values, matrix[:, start:end])
     if last_action:
-        _one_hot(table.last, matrix[:, end:])
-    return matrix
+        encode_last(matrix, table.last[rows], len(table.actions))
+    return whole
+
+
+def encode_last(matrix: Float32Array, last: IntArray, actions: int) -> None:
+    """Writes LAT to a matrix that has it: positions of actions, shape (rows,)."""
+    _one_hot(last, matrix[:, matrix.shape[1] - actions :])
 
 
 def exact_threshold(threshold: float) -> float:

@@ -37,18 +37,18 @@ def shown_rows(table: DemonstrationTable, trained: TrainedTree) -> ShownChannel:
     leaves, leaf_of_row = np.unique(trained.leaves(table), return_inverse=True)
     group_of_row = _groups(len(leaves), most)[leaf_of_row]
     order = np.argsort(group_of_row, kind="stable")
-    groups = np.split(table.states[order], np.flatnonzero(np.diff(group_of_row[order])) + 1)
+    starts = np.flatnonzero(np.diff(group_of_row[order], prepend=-1))
+    # Feature by feature, so that a large table is not held a second time.
+    columns = [
+        _values(feature, table.states[:, place], order, starts)
+        for place, feature in enumerate(table.features)
+    ]
+    rows = np.diff(starts, append=len(table)).tolist()
     return ShownChannel(
         table.channel,
         tuple(
-            ShownLeaf(
-                len(states),
-                tuple(
-                    _values(feature, states[:, place])
-                    for place, feature in enumerate(table.features)
-                ),
-            )
-            for states in groups
+            ShownLeaf(count, tuple(values[group] for values in columns))
+            for group, count in enumerate(rows)
         ),
     )
 
@@ -59,11 +59,31 @@ def _groups(leaves: int, most: int) -> IntArray:
     return np.arange(leaves) * count // max(leaves, 1)
 
 
-def _values(feature: Feature, column: FloatArray) -> ShownValues:
-    known = column[~np.isnan(column)]
-    if feature.lag or not len(known):
-        return None
+def _values(
+    feature: Feature, column: FloatArray, order: IntArray, starts: IntArray
+) -> list[ShownValues]:
+    """What a feature was in the rows of each group.
+
+    Args:
+        feature: The feature.
+        column: Its values, shape (rows,).
+        order: Positions of the rows, group after group.
+        starts: Where each group begins in `order`.
+    """
+    if feature.lag:
+        return [None] * len(starts)
+    ordered = column[order]
     if feature.kind is FeatureKind.CATEGORICAL:
-        codes = np.unique(known).astype(np.int64).tolist()
-        return tuple(feature.categories[code] for code in codes)
-    return Span(float(known.min()), float(known.max()))
+        return [_categories(feature, one) for one in np.split(ordered, starts[1:])]
+    # These leave out what is missing, unless all is.
+    low, high = np.fmin.reduceat(ordered, starts), np.fmax.reduceat(ordered, starts)
+    return [
+        None if np.isnan(least) else Span(least, most)
+        for least, most in zip(low.tolist(), high.tolist(), strict=True)
+    ]
+
+
+def _categories(feature: Feature, column: FloatArray) -> ShownValues:
+    known = column[~np.isnan(column)]
+    codes = np.unique(known).astype(np.int64).tolist()
+    return tuple(feature.categories[code] for code in codes) if codes else None

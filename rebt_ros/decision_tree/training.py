@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import TypeAlias
 
 import numpy as np
 from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree.nodes import Action
-from rebt_ros.decision_tree.encoding import Indicator, Number, columns, encode
+from rebt_ros.decision_tree.encoding import Indicator, Number, columns, encode, encode_last
 from rebt_ros.decision_tree.pruning import PruningPath, pruning_path
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.decision_tree.upsampling import Upsampled, Upsampling, svm_smote
@@ -22,6 +23,8 @@ from rebt_ros.demonstration.table import DemonstrationTable
 
 #: Tables and trees that are in the making at the same time, whatever the number of cores.
 _MOST_AT_A_TIME = 4
+#: Rows that are predicted at a time.
+_ROWS_AT_A_TIME = 65_536
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -51,8 +54,7 @@ class TrainedTree:
 
     def leaves(self, table: DemonstrationTable) -> IntArray:
         """The node of the classifier that decides for each row, shape (rows,)."""
-        reached = self.classifier.apply(encode(table, self.uses_last_action))
-        return np.asarray(self.standing[reached], dtype=np.int64)
+        return np.asarray(self.standing[_reached(self.classifier, table, self.uses_last_action)])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -93,11 +95,15 @@ class FittedTree:
             ccp_alphas: The levels, ascending, shape (levels,).
         """
         tree = self.classifier.tree_
-        reached = self.classifier.decision_path(encode(table, self.uses_last_action)).tocsc()
+        reached = _reached(self.classifier, table, self.uses_last_action)
+        actions = len(table.actions)
+        counts = np.bincount(reached * actions + table.chosen, minlength=tree.node_count * actions)
+        counts = counts.reshape(tree.node_count, actions)
+        # Rows that reach a node reach its parent; parents come before their children.
+        for node in range(tree.node_count - 1, 0, -1):
+            counts[self.path.parents[node]] += counts[node]
         majority = self.classifier.classes_[np.argmax(tree.value[:, 0, :], axis=1)]
-        node_of_entry = np.repeat(np.arange(tree.node_count), np.diff(reached.indptr))
-        right = table.chosen[reached.indices] == majority[node_of_entry]
-        predicted = np.bincount(node_of_entry[right], minlength=tree.node_count)
+        predicted = counts[np.arange(tree.node_count), majority]
         first, end = self.path.levels_decided(ccp_alphas)
         change = np.zeros(len(ccp_alphas) + 1)
         np.add.at(change, first, predicted)
@@ -130,33 +136,94 @@ def fit(
         return _fitted(table, options)
 
 
-def fit_all(
-    tables: Sequence[Callable[[], DemonstrationTable]],
+def fit_parts(
+    table: DemonstrationTable,
+    parts: Sequence[BoolArray],
     *,
     last_action: bool,
     max_depth: int | None = None,
     random_state: int = 0,
     upsample: Upsampling = Upsampling.NONE,
 ) -> Iterator[FittedTree]:
-    """Fits a decision tree to each table, on several processor cores; see `fit`.
+    """Fits a decision tree to the table and one to each part, on several cores; see `fit`.
 
     Args:
-        tables: Each is made when its turn comes, so that few are held at a time.
+        table: All rows.
+        parts: Rows of each part, shape (rows,); as in `DemonstrationTable.where`.
         last_action: As for `fit`, like all that follow.
         max_depth: Splits on the longest path.
         random_state: Of each fit.
-        upsample: Of each table.
+        upsample: Of each part.
 
     Yields:
-        The trees in the order of the tables.
+        The tree of the table, then those of the parts.
     """
     options = _FitOptions(last_action, max_depth, random_state, upsample)
-    # Threads are enough: scikit-learn lets go of Python's lock while it grows a tree.  The library
-    # that upsampling is done with is not known to stand threads.
-    alone = upsample is not Upsampling.NONE
-    workers = 1 if alone else min(_MOST_AT_A_TIME, os.cpu_count() or 1)
+    if upsample is not Upsampling.NONE:
+        # The library that upsampling is done with is not known to stand threads.
+        yield fit(table, **asdict(options))
+        for part in parts:
+            yield fit(table.where(part), **asdict(options))
+        return
+    # Threads are enough: scikit-learn lets go of Python's lock while it grows a tree.
+    workers = min(_MOST_AT_A_TIME, os.cpu_count() or 1)
     with _quiet(), ThreadPoolExecutor(workers) as pool:
-        yield from pool.map(lambda table: _fitted(table(), options), tables)
+        yield from pool.map(_Parts(table, parts, options).fitted, range(len(parts) + 1))
+
+
+class _Parts:
+    """Parts of a table that share one matrix, in which the rows outside a part weigh nothing.
+
+    scikit-learn leaves such rows out, so that each tree is the one that a matrix of its own would
+    give: only sums of whole numbers decide about it, whatever their order.
+    """
+
+    def __init__(
+        self, table: DemonstrationTable, parts: Sequence[BoolArray], options: _FitOptions
+    ) -> None:
+        self._table, self._parts, self._options = table, parts, options
+        # LAT of a part differs where rows before are missing: those rows are appended.
+        changed = [_changed(table, part) if options.last_action else _NO_ROWS for part in parts]
+        again, last = (np.concatenate(one) for one in zip(_NO_ROWS, *changed, strict=True))
+        self._matrix = encode(table, options.last_action, spare=len(again))
+        if len(again):
+            appended = self._matrix[len(table) :]
+            appended[:] = self._matrix[again]
+            encode_last(appended, last, len(table.actions))
+        # Small numbers: scikit-learn sorts them, and copies them more than once.
+        kind = np.min_scalar_type(len(table.actions))
+        self._chosen = np.append(table.chosen, table.chosen[again]).astype(kind)
+        ends = np.cumsum([len(table), *(len(rows) for rows, _ in changed)])
+        self._instead = [
+            (rows, slice(start, end))
+            for (rows, _), start, end in zip(changed, ends[:-1], ends[1:], strict=True)
+        ]
+
+    def fitted(self, number: int) -> FittedTree:
+        """The tree of the table, for 0, or of a part."""
+        weights = np.zeros(len(self._matrix))
+        if number:
+            weights[: len(self._table)] = self._parts[number - 1]
+            instead, appended = self._instead[number - 1]
+            weights[instead] = 0
+            weights[appended] = 1
+        else:
+            weights[: len(self._table)] = 1
+        classifier = self._options.classifier()
+        classifier.fit(self._matrix, self._chosen, sample_weight=weights)
+        return _as_fitted(self._table, classifier, self._options)
+
+
+#: Rows whose LAT differs in a part, and that LAT.
+_Changed: TypeAlias = tuple[IntArray, IntArray]
+_NO_ROWS: _Changed = (np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+
+
+def _changed(table: DemonstrationTable, part: BoolArray) -> _Changed:
+    last = table.last_where(part)
+    rows = np.flatnonzero(part)
+    differing = last != table.last[rows]
+    return rows[differing], last[differing]
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +232,11 @@ class _FitOptions:
     max_depth: int | None
     random_state: int
     upsample: Upsampling
+
+    def classifier(self) -> DecisionTreeClassifier:
+        return DecisionTreeClassifier(
+            criterion="gini", max_depth=self.max_depth, random_state=self.random_state
+        )
 
 
 @contextmanager
@@ -180,20 +252,32 @@ def _quiet() -> Iterator[None]:
 
 def _fitted(table: DemonstrationTable, options: _FitOptions) -> FittedTree:
     last_action, random_state = options.last_action, options.random_state
-    asked = columns(table, last_action)
     matrix, chosen = encode(table, last_action), table.chosen
     notes: tuple[str, ...] = ()
     if options.upsample is Upsampling.SVM_SMOTE:
-        more = svm_smote(matrix, chosen, asked, random_state)
+        more = svm_smote(matrix, chosen, columns(table, last_action), random_state)
         notes = tuple(_notes(table, more))
         matrix, chosen = more.matrix, more.chosen
-    classifier = DecisionTreeClassifier(
-        criterion="gini", max_depth=options.max_depth, random_state=random_state
-    )
+    classifier = options.classifier()
     classifier.fit(matrix, chosen)
+    return _as_fitted(table, classifier, options, notes)
+
+
+def _as_fitted(
+    table: DemonstrationTable,
+    classifier: DecisionTreeClassifier,
+    options: _FitOptions,
+    notes: tuple[str, ...] = (),
+) -> FittedTree:
     actions = tuple(Action(label, table.channel) for label in table.actions)
-    path = pruning_path(classifier)
-    return FittedTree(classifier, path, actions, asked, last_action, notes)
+    return FittedTree(
+        classifier,
+        pruning_path(classifier),
+        actions,
+        columns(table, options.last_action),
+        options.last_action,
+        notes,
+    )
 
 
 def train(
@@ -214,6 +298,18 @@ def train(
         upsample=upsample,
     )
     return fitted.at(ccp_alpha)
+
+
+def _reached(
+    classifier: DecisionTreeClassifier, table: DemonstrationTable, last_action: bool
+) -> IntArray:
+    """The leaf of the classifier that each row reaches, shape (rows,)."""
+    reached = np.empty(len(table), dtype=np.int64)
+    # In parts, so that a large table is not held a second time.
+    for start in range(0, len(table), _ROWS_AT_A_TIME):
+        rows = slice(start, start + _ROWS_AT_A_TIME)
+        reached[rows] = classifier.apply(encode(table, last_action, rows))
+    return reached
 
 
 def _notes(table: DemonstrationTable, more: Upsampled) -> Iterator[str]:

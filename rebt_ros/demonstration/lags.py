@@ -33,6 +33,8 @@ def with_lags(table: DemonstrationTable, lags: int) -> DemonstrationTable:
     Returns:
         The same rows; all features of the table, then all of one row before, and so on.
     """
+    if not lags:
+        return table
     # Position in its demonstration; a demonstration's rows stand together.
     row = np.arange(len(table)) - np.searchsorted(table.demonstration, table.demonstration)
     blocks = [table.states]

@@ -56,14 +56,20 @@ class DemonstrationTable:
 
         LAT is derived anew: a part that begins inside a demonstration begins without one.
         """
+        # Rows that stand together are not copied: tables can be large.
+        part = _stretch(rows)
         return replace(
             self,
-            states=self.states[rows],
-            chosen=self.chosen[rows],
-            demonstration=self.demonstration[rows],
-            stamps=self.stamps[rows],
+            states=self.states[part],
+            chosen=self.chosen[part],
+            demonstration=self.demonstration[part],
+            stamps=self.stamps[part],
             before=self._before_parts(rows),
         )
+
+    def last_where(self, rows: BoolArray) -> IntArray:
+        """LAT in the table of some rows only (see `where`), which is not made."""
+        return last_actions(self.chosen[rows], self.demonstration[rows], self._before_parts(rows))
 
     def _before_parts(self, rows: BoolArray) -> IntArray | None:
         if self.before is None:
@@ -89,6 +95,13 @@ class DemonstrationTable:
             return np.arange(len(self)) >= _share_kept(len(self), fraction)
         first = int(shown[_share_kept(len(shown), fraction)])
         return np.greater_equal(self.demonstration, first)
+
+
+def _stretch(rows: BoolArray) -> BoolArray | slice:
+    """The rows as a slice, if they stand together."""
+    chosen = int(np.count_nonzero(rows))
+    first = int(np.argmax(rows)) if chosen else 0
+    return slice(first, first + chosen) if rows[first : first + chosen].all() else rows
 
 
 def _share_kept(count: int, fraction: float) -> int:

@@ -41,10 +41,10 @@ def spelled_out(dnf: Dnf, conditions: Iterable[Condition]) -> Dnf:
     spelled: list[Conjunction] = []
     for conjunction in dnf:
         implied = (one for literal in conjunction for one in _implied(literal, related))
-        literals = tuple(dict.fromkeys((*conjunction, *implied)))
+        literals = dict.fromkeys((*conjunction, *implied))
         # One that contradicts itself holds in no state.
         if not any(~literal in literals for literal in literals):
-            spelled.append(Conjunction(literals))
+            spelled.append(Conjunction(tuple(literals)))
     return Dnf(tuple(spelled))
 
 

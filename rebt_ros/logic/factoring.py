@@ -7,9 +7,14 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from functools import reduce
+from itertools import chain
+from operator import and_
+from typing import NamedTuple
 
 from rebt_ros.logic.conditions import Literal
-from rebt_ros.logic.dnf import Conjunction, Dnf
+from rebt_ros.logic.dnf import Dnf, conditions_of
+from rebt_ros.logic.numbered import Codes, Cover, Numbering, mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,15 +37,8 @@ def pull_out_common(dnf: Dnf) -> Factored:
     Args:
         dnf: At least one conjunction, none of which implies another (as espresso leaves it).
     """
-    first, *others = dnf.conjunctions
-    common = tuple(one for one in first if all(one in other.literals for other in others))
-    if not others:
-        return Factored(common)
-    shared = frozenset(common)
-    return Factored(
-        common,
-        tuple(Factored(conjunction.without(shared).literals) for conjunction in dnf),
-    )
+    numbering = Numbering(conditions_of(dnf))
+    return named(pulled_out(numbering.cover(dnf)), numbering)
 
 
 def factor(dnf: Dnf) -> Factored:
@@ -52,16 +50,55 @@ def factor(dnf: Dnf) -> Factored:
     Args:
         dnf: At least one conjunction, none of which implies another (as espresso leaves it).
     """
-    pulled = pull_out_common(dnf)
-    return Factored(pulled.common, tuple(_divided(list(pulled.alternatives))))
+    numbering = Numbering(conditions_of(dnf))
+    return named(factored(numbering.cover(dnf)), numbering)
 
 
-def _divided(alternatives: list[Factored]) -> list[Factored]:
+class Parts(NamedTuple):
+    """`Factored` in numbers."""
+
+    common: Codes
+    alternatives: tuple[Parts, ...] = ()
+
+
+def named(parts: Parts, numbering: Numbering) -> Factored:
+    """What was factored in numbers, in literals."""
+    return Factored(
+        numbering.literals(parts.common), tuple(named(one, numbering) for one in parts.alternatives)
+    )
+
+
+def factored(cover: Cover) -> Parts:
+    """`factor` in numbers."""
+    common, rest = _pulled_out(cover)
+    return Parts(common, tuple(_divided(rest)))
+
+
+def pulled_out(cover: Cover) -> Parts:
+    """`pull_out_common` in numbers."""
+    common, rest = _pulled_out(cover)
+    return Parts(common, tuple(map(Parts, rest)))
+
+
+def _pulled_out(cover: Cover) -> tuple[Codes, Cover]:
+    """What all conjunctions have in common, and the rest of each; of one there is no rest."""
+    if len(cover) == 1:
+        return cover[0], ()
+    shared = reduce(and_, map(mask, cover))
+    if not shared:
+        return (), cover
+    common = tuple(code for code in cover[0] if shared >> code & 1)
+    return common, [tuple(code for code in codes if not shared >> code & 1) for codes in cover]
+
+
+def _divided(cover: Cover) -> list[Parts]:
     """An OR of plain conjunctions as an OR of factored ones."""
-    occurrences = Counter(literal for one in alternatives for literal in one.common)
-    divisor, times = max(occurrences.items(), key=lambda pair: pair[1], default=(None, 0))
-    if divisor is None or times < 2:
-        return alternatives
-    dividend = [Conjunction(one.common) for one in alternatives if divisor in one.common]
-    remainder = [one for one in alternatives if divisor not in one.common]
-    return [factor(Dnf(tuple(dividend))), *_divided(remainder)]
+    parts: list[Parts] = []
+    while cover:
+        occurrences = Counter(chain.from_iterable(cover))
+        divisor = max(occurrences, key=occurrences.__getitem__, default=None)
+        if divisor is None or occurrences[divisor] < 2:
+            return [*parts, *map(Parts, cover)]
+        parts.append(factored([codes for codes in cover if divisor in codes]))
+        cover = [codes for codes in cover if divisor not in codes]
+    return parts

@@ -6,10 +6,11 @@ Espresso treats conditions as free variables.  Thresholds are not free: ``x <= 0
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from rebt_ros.logic.conditions import Literal, Threshold
-from rebt_ros.logic.dnf import Conjunction, Dnf
+from rebt_ros.logic.conditions import Condition, Literal, Threshold
+from rebt_ros.logic.dnf import Dnf, conditions_of
+from rebt_ros.logic.numbered import Codes, Numbering, mask
 
 
 def implies(stronger: Literal, weaker: Literal) -> bool:
@@ -37,32 +38,60 @@ def float_reduction(dnf: Dnf) -> Dnf:
     conjunctions of which one implies the other, the weaker stays.  The truth value is unchanged
     in every state.
     """
-    distinct: dict[frozenset[Literal], Conjunction] = {}
-    for conjunction in map(_strongest, dnf):
+    numbering = Numbering(conditions_of(dnf))
+    implied = implied_literals(numbering.conditions)
+    return numbering.dnf(reduced(numbering.cover(dnf), implied))
+
+
+def implied_literals(conditions: Sequence[Condition]) -> list[int]:
+    """For each code, the mask of what it implies as in `implies`, itself included."""
+    implied = [1 << code for code in range(2 * len(conditions))]
+    of_feature: dict[str, list[tuple[float, int]]] = {}
+    for position, condition in enumerate(conditions):
+        if isinstance(condition, Threshold):
+            of_feature.setdefault(condition.feature, []).append((condition.value, position))
+    for thresholds in of_feature.values():
+        # A positive literal implies those of higher thresholds, a negative one of lower ones.
+        for positive, ordered in ((1, sorted(thresholds, reverse=True)), (0, sorted(thresholds))):
+            weaker = 0
+            for _, position in ordered:
+                weaker |= 1 << (2 * position + positive)
+                implied[2 * position + positive] = weaker
+    return implied
+
+
+def reduced(cover: Iterable[Codes], implied: Sequence[int]) -> list[Codes]:
+    """`float_reduction` of a cover.
+
+    Args:
+        cover: The conjunctions.
+        implied: From `implied_literals`, of the vocabulary of the cover.
+    """
+    distinct: dict[int, Codes] = {}
+    for conjunction in cover:
+        strongest = _strongest(conjunction, implied)
         # Two that differ in nothing but the order of their literals would subsume each other.
-        distinct.setdefault(frozenset(conjunction), conjunction)
-    reduced = distinct.values()
-    return Dnf(
-        tuple(
-            conjunction
-            for conjunction in reduced
-            if not any(
-                _conjunction_implies(conjunction, other) and other != conjunction
-                for other in reduced
-            )
-        )
-    )
+        distinct.setdefault(mask(strongest), strongest)
+    wanted = list(distinct)
+    kept: list[Codes] = []
+    for own, conjunction in distinct.items():
+        missing = ~_closure(conjunction, implied)
+        # One conjunction implies another if it implies all its literals.
+        if not any(not (other & missing) and other != own for other in wanted):
+            kept.append(conjunction)
+    return kept
 
 
-def _strongest(conjunction: Conjunction) -> Conjunction:
-    return conjunction.without(
-        frozenset(
-            weaker
-            for weaker in conjunction
-            if any(implies(other, weaker) for other in conjunction if other != weaker)
-        )
-    )
+def _strongest(conjunction: Codes, implied: Sequence[int]) -> Codes:
+    subsumed = 0
+    for code in conjunction:
+        subsumed |= implied[code] & ~(1 << code)
+    return tuple(code for code in conjunction if not subsumed >> code & 1)
 
 
-def _conjunction_implies(stronger: Conjunction, weaker: Iterable[Literal]) -> bool:
-    return all(any(implies(mine, its) for mine in stronger) for its in weaker)
+def _closure(conjunction: Codes, implied: Sequence[int]) -> int:
+    """All literals that the conjunction implies."""
+    closure = 0
+    for code in conjunction:
+        closure |= implied[code]
+    return closure

@@ -6,10 +6,12 @@ the truth value is unchanged in every state.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import permutations
 
-from rebt_ros.logic.conditions import KNOWN, Interval, Literal, Threshold
+from rebt_ros.logic.conditions import KNOWN, Condition, Interval, Literal, Threshold
 from rebt_ros.logic.factoring import Factored
+from rebt_ros.logic.numbered import Codes, mask
 
 
 def with_intervals(condition: Factored) -> Factored:
@@ -42,6 +44,31 @@ def merged(conjunction: Iterable[Literal]) -> tuple[Literal, ...]:
         else:
             literals.append(literal)
     return tuple(literals)
+
+
+def enclosing_literals(conditions: Sequence[Condition]) -> list[int]:
+    """For each code, the mask of the literals with which it is an interval; none but for ``>``."""
+    enclosing = [0] * (2 * len(conditions))
+    of_feature: dict[str, list[int]] = {}
+    for place, condition in enumerate(conditions):
+        if isinstance(condition, Threshold):
+            of_feature.setdefault(condition.feature, []).append(place)
+    for places in of_feature.values():
+        for lower, upper in permutations(places, 2):
+            if _interval(~Literal(conditions[lower]), Literal(conditions[upper])) is not None:
+                enclosing[2 * lower] |= 1 << (2 * upper + 1)
+    return enclosing
+
+
+def intervals_among(conjunction: Codes, enclosing: Sequence[int]) -> int:
+    """How many intervals `merged` makes of a conjunction in numbers, which is float-reduced.
+
+    Args:
+        conjunction: At most one lower and one upper threshold of each feature.
+        enclosing: From `enclosing_literals`.
+    """
+    there = mask(conjunction)
+    return sum(1 for code in conjunction if enclosing[code] & there)
 
 
 def _interval(one: Literal, other: Literal) -> Interval | None:

@@ -7,17 +7,21 @@ symbolic expressions: those would have to be built, ordered and taken apart agai
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
 from typing import TypeAlias
 
 from pyeda.boolalg.espresso import DTYPE, FTYPE, RTYPE, espresso
 
-from rebt_ros.logic.conditions import Condition, Literal
-from rebt_ros.logic.dnf import FALSE, TRUE, Conjunction, Dnf, conditions_of
+from rebt_ros.logic.dnf import FALSE, Dnf, conditions_of
+from rebt_ros.logic.numbered import Codes, Cover, Numbering
 
 #: Positional cube notation: what espresso calls the value of one input.
 _NEGATIVE, _POSITIVE, _ABSENT = 1, 2, 3
 #: Value of the only output: not in the ON-set, in it, or free to be either.
 _OFF, _ON, _DONT_CARE = 0, 1, 2
+
+#: Place of each value of an input in the order in which cubes are read: positive ones come first.
+_RANK = {_POSITIVE: 0, _NEGATIVE: 1, _ABSENT: 2}
 
 _Cube: TypeAlias = tuple[int, ...]
 
@@ -39,24 +43,44 @@ def minimize(dnf: Dnf, dont_care: Dnf = FALSE, off: Dnf | None = None) -> Dnf:
         A DNF equal to `dnf` on every assignment of its conditions outside `dont_care`.  Literals
         stand in the order in which their conditions first occur, and so do conjunctions.
     """
-    if dnf.is_true or dnf == FALSE:
-        # Espresso has no cubes of zero inputs.
-        return TRUE if dnf.is_true else FALSE
-    if off == FALSE:
-        return TRUE
     given = Dnf(dnf.conjunctions + dont_care.conjunctions + (off or FALSE).conjunctions)
-    vocabulary = conditions_of(given)
+    numbering = Numbering(conditions_of(given))
+    minimized = minimized_cover(
+        numbering.cover(dnf),
+        numbering.cover(dont_care),
+        None if off is None else numbering.cover(off),
+    )
+    return numbering.dnf(minimized)
+
+
+def minimized_cover(on: Cover, dont_care: Cover = (), off: Cover | None = None) -> list[Codes]:
+    """`minimize` in numbers."""
+    if not on or not all(on):
+        # Espresso has no cubes of zero inputs.
+        return [()] if on else []
+    if off is not None and not off:
+        return [()]
+    given = dict.fromkeys(chain.from_iterable(chain(on, dont_care, off or ())))
+    vocabulary = tuple(dict.fromkeys(code >> 1 for code in given))
     place = {condition: place for place, condition in enumerate(vocabulary)}
-    cover = [(_cube(conjunction, place), (_ON,)) for conjunction in dnf]
-    cover += [(_cube(conjunction, place), (_DONT_CARE,)) for conjunction in dont_care]
+    cover = [(_cube(codes, place), (_ON,)) for codes in on]
+    cover += [(_cube(codes, place), (_DONT_CARE,)) for codes in dont_care]
     kinds = FTYPE | DTYPE
     if off is not None:
-        cover += [(_cube(conjunction, place), (_OFF,)) for conjunction in off]
+        cover += [(_cube(codes, place), (_OFF,)) for codes in off]
         kinds |= RTYPE
     _rewind()
     minimized = espresso(len(vocabulary), 1, cover, kinds)
+    # Cubes that test the first conditions of the vocabulary come first, positive ones before.
     cubes = sorted((inputs for inputs, _ in minimized), key=_reading_order)
-    return Dnf(tuple(_conjunction(cube, vocabulary) for cube in cubes))
+    return [
+        tuple(
+            2 * condition + (value == _POSITIVE)
+            for condition, value in zip(vocabulary, cube, strict=True)
+            if value != _ABSENT
+        )
+        for cube in cubes
+    ]
 
 
 def _rewind() -> None:
@@ -72,22 +96,11 @@ def _rewind() -> None:
 
 
 def _reading_order(cube: _Cube) -> list[int]:
-    """Cubes that test the first conditions of the vocabulary come first, positive ones before."""
-    return [(_POSITIVE, _NEGATIVE, _ABSENT).index(value) for value in cube]
+    return [_RANK[value] for value in cube]
 
 
-def _cube(conjunction: Conjunction, place: Mapping[Condition, int]) -> _Cube:
+def _cube(codes: Codes, place: Mapping[int, int]) -> _Cube:
     cube = [_ABSENT] * len(place)
-    for literal in conjunction:
-        cube[place[literal.condition]] = _POSITIVE if literal.positive else _NEGATIVE
+    for code in codes:
+        cube[place[code >> 1]] = _POSITIVE if code & 1 else _NEGATIVE
     return tuple(cube)
-
-
-def _conjunction(cube: _Cube, vocabulary: tuple[Condition, ...]) -> Conjunction:
-    return Conjunction(
-        tuple(
-            Literal(condition, positive=value == _POSITIVE)
-            for condition, value in zip(vocabulary, cube, strict=True)
-            if value != _ABSENT
-        )
-    )

@@ -52,7 +52,9 @@ _NOVEL: Final = "states outside what was shown"
 
 
 class ExecutorNode(Node):
-    """Ticks the latest tree at a fixed rate, while it is enabled and nothing speaks against it.
+    """Ticks the latest tree while it is enabled and nothing speaks against it.
+
+    It does so at a fixed rate or, where that is asked for, as soon as a state arrives.
 
     What does: a state that is not fresh, a person who has taken over, and, where that is asked
     for, a state outside what was shown.
@@ -115,7 +117,7 @@ class ExecutorNode(Node):
             self._check_topics(program)
             self._install(program)
         self.create_service(SetBool, "~/enable", self._enable)
-        self.create_timer(1.0 / self._settings.rate, self._tick, clock=self._time)
+        self._timer = self.create_timer(1.0 / self._settings.rate, self._tick, clock=self._time)
         self.create_timer(_SNAPSHOT_PERIOD, self._publish_snapshot, clock=steady)
         self._diagnostics = Diagnostics(self, "execution", self._report)
         self._say_who_drives()
@@ -227,6 +229,19 @@ class ExecutorNode(Node):
         self._latest[topic] = Message(message.data, self._now())
         self._accept(topic)
         self._try_candidate()
+        if self._settings.tick_on_state:
+            self._tick_on(topic)
+
+    def _tick_on(self, topic: str) -> None:
+        """Ticks on a state that has just arrived; the timer's next tick is a whole period away."""
+        program = self._program
+        if program is None or topic not in program.inputs.topics:
+            return
+        # Lagged features look back at ticks that are evenly spaced: those of the timer.
+        if any(feature.lag for feature in program.learned.features):
+            return
+        self._timer.reset()
+        self._tick()
 
     def _accept(self, topic: str, *, quietly: bool = False) -> None:
         if self._program is None or topic not in self._program.inputs.topics:

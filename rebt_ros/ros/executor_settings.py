@@ -36,6 +36,8 @@ class ExecutorSettings:
     tree_file: Path | None
     rate: float
     """Ticks per second."""
+    tick_on_state: bool
+    """Whether a state is ticked on when it arrives; `rate` is then that of ticks without one."""
     state_timeout: int
     state_topic: str
     every_tick: bool
@@ -74,9 +76,17 @@ def declare_settings(node: Node) -> ExecutorSettings:
         "When to send the command.",
         choices=("every_tick", "on_change"),
     )()
+    tick_on = declare.text(
+        "tick_on",
+        "timer",
+        "When to tick: timer, or state to tick when a state message arrives, and at the rate while "
+        "none does.",
+        choices=("timer", "state"),
+    )()
     return ExecutorSettings(
         tree_file=Path(tree_file).expanduser() if tree_file else None,
         rate=rate,
+        tick_on_state=tick_on == "state",
         state_timeout=_nanoseconds(state_timeout),
         state_topic=declare.text(
             "state_topic", "state", "State topic of a tree that was learned from a table."
