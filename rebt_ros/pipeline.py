@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rebt_ros import evaluation
+from rebt_ros.algorithms.priority_root import MOST_LEAVES_IN_BEST_ORDER
 from rebt_ros.algorithms.suggestions import ALL
 from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
@@ -47,6 +48,10 @@ class Learning:
 _UNEVEN = (
     "the rows of channel {!r} are not evenly spaced, so that a row back is now more, now less time "
     "back: record with a sample rate to use lags"
+)
+_LARGE = (
+    "the decision tree of channel {!r} has {} leaves, too many for the best order of the rules to be "
+    "searched for: they stand by their number of leaves; prune more for a smaller tree"
 )
 
 #: Where of all the work choosing and judging begin.
@@ -214,6 +219,9 @@ def learn_from(
     )
     if options.lags and not evenly_spaced(table):
         notes = (*notes, _UNEVEN.format(table.channel))
+    leaves = sum(1 for _ in trained.tree.paths())
+    if leaves > MOST_LEAVES_IN_BEST_ORDER and options.reductions is not None:
+        notes = (*notes, _LARGE.format(table.channel, leaves))
     tree, suggestions = accept(tree, suggestions, options)
     learned = as_learned(table, trained, tree, policy.ccp_alpha, figures, options)
     ranges = shown_rows(learned_from, trained)

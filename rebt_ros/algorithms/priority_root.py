@@ -36,6 +36,9 @@ MOST_LEAVES_BY_DOMAIN = 40
 #: rules are ordered by their number of leaves, as a search would take a minimization per pair.
 _MOST_RULES_IN_ANY_ORDER, _MOST_RULES_STEP_BY_STEP = 6, 16
 
+#: In larger decision trees, too, rules are ordered by their number of leaves.
+MOST_LEAVES_IN_BEST_ORDER = 500
+
 #: Nodes of any rule that has a condition: a Sequence of the condition and an action.
 _LEAST_COST = 3
 
@@ -100,7 +103,7 @@ def reduced_tree(
     if by_priority:
         order = (
             _best_order(len(rules), cost)
-            if len(rules) <= _MOST_RULES_STEP_BY_STEP
+            if len(rules) <= _MOST_RULES_STEP_BY_STEP and leaves <= MOST_LEAVES_IN_BEST_ORDER
             else sorted(order, key=lambda rule: len(rules[rule].dnf))
         )
     trees = []

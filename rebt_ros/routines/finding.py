@@ -60,8 +60,8 @@ def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:
 
     Returns:
         Each once, whatever its thresholds: routines of the best program, those that explain the
-        most rows first; then its Sequences cut in two before a step with a guard; routines of the
-        next programs; and Sequences cut elsewhere.
+        most rows first; then its Sequences cut in two, before a step with a guard first; then the
+        routines of the next programs.
     """
     shown = moments(table)
     together = shown.rows - len(shown)
@@ -77,8 +77,8 @@ def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:
     best = readings[0]
     offered = [one.whole for one in best]
     offered += [part for one in best for part in one.parts(guarded=True)]
-    offered += [one.whole for reading in readings[1:] for one in reading]
     offered += [part for one in best for part in one.parts(guarded=False)]
+    offered += [one.whole for reading in readings[1:] for one in reading]
     different: dict[object, FoundRoutine] = {}
     for routine in offered:
         if len(routine.subtree.children) > 1:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.arrays import Float32Array, FloatArray, IntArray
 from rebt_ros.routines.program import Place, Step, Stream, places
 
 
@@ -41,11 +41,11 @@ class StreamModel:
     """As of stream 0."""
     action: IntArray
     """What is done in each state, shape (states,)."""
-    within: FloatArray
+    within: Float32Array
     """Probability of the next member of a step that is not done yet, shape (states, states)."""
     stops: FloatArray
     """Probability to stop within a step; 1 where it is done, shape (states,)."""
-    after: FloatArray
+    after: Float32Array
     """How the next step begins where one is done, 0 elsewhere, shape (states, states)."""
     border: IntArray
     """Which of the stream's borders lies behind a state; -1 where none does, shape (states,)."""
@@ -71,7 +71,7 @@ class _Block(NamedTuple):
     """How it goes on from each set of done members, added up."""
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=512)
 def stream_model(stream: Stream, persistence: float) -> StreamModel:
     """The model of a stream.
 
@@ -84,7 +84,7 @@ def stream_model(stream: Stream, persistence: float) -> StreamModel:
     blocks = [_block(len(step), persistence) for step in steps]
     begin = np.cumsum([0, *(len(block.states) for block in blocks)]).tolist()
     size = begin[-1]
-    within, after = np.zeros((size, size)), np.zeros((size, size))
+    within, after = np.zeros((2, size, size), np.float32)
     stops, border = np.ones(size), np.full(size, -1)
     anywhere = np.zeros(size)
     borders: dict[tuple[Place, Place], int] = {}
