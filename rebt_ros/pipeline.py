@@ -50,8 +50,8 @@ _UNEVEN = (
     "back: record with a sample rate to use lags"
 )
 _LARGE = (
-    "the decision tree of channel {!r} has {} leaves, too many for the best order of the rules to be "
-    "searched for: they stand by their number of leaves; prune more for a smaller tree"
+    "the decision tree of channel {!r} has {} leaves, too many for the best order of the rules to "
+    "be searched for: they stand by their number of leaves; prune more for a smaller tree"
 )
 
 #: Where of all the work choosing and judging begin.

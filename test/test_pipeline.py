@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import rebt_ros
-from rebt_ros import evaluation
+from rebt_ros import evaluation, pipeline
+from rebt_ros.algorithms import priority_root
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row
@@ -155,6 +156,22 @@ def test_demonstrations_without_features_are_decided_by_their_majority() -> None
 def test_options_out_of_range_are_refused_by_name(wrong: dict[str, float]) -> None:
     with pytest.raises(OptionError, match=next(iter(wrong))):
         LearnOptions(**wrong)  # type: ignore[arg-type]
+
+
+def test_a_tree_too_large_for_the_best_order_of_rules_is_equivalent_and_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    table = tabulate([turning_and_going("one", 1), there_and_back("two")])[0]
+    assert not any("best order" in note for note in learn_from(table).notes)
+    for module in (pipeline, priority_root):
+        monkeypatch.setattr(module, "MOST_LEAVES_IN_BEST_ORDER", 1)
+    learning = learn_from(table)
+    chosen = evaluation.teacher_forced_choices(learning.learned.tree, table)
+    assert (chosen == learning.decision_tree.predict(table)).all()
+    (note,) = [note for note in learning.notes if "best order" in note]
+    leaves = sum(1 for _ in learning.decision_tree.tree.paths())
+    assert f"{leaves} leaves" in note
+    assert "prune more" in note
 
 
 @pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])
