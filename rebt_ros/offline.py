@@ -243,7 +243,7 @@ def _intervals(tree: nodes.Node) -> int:
 
 def _choices(learning: Learning) -> dict[str, Any]:
     return {
-        "decision_tree_leaves": sum(1 for _ in learning.decision_tree.tree.paths()),
+        "decision_tree_leaves": learning.decision_tree.tree.leaves,
         "psa": learning.policy.psa,
         "reasons": list(learning.policy.reasons),
         "levels": list(_levels(learning.policy.levels)),

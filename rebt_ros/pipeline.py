@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rebt_ros import evaluation
-from rebt_ros.algorithms.priority_root import MOST_LEAVES_IN_BEST_ORDER
+from rebt_ros.algorithms.priority_root import MOST_LEAVES_IN_BEST_ORDER, MOST_LEAVES_MINIMIZED
 from rebt_ros.algorithms.suggestions import ALL
 from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
@@ -52,6 +52,10 @@ _UNEVEN = (
 _LARGE = (
     "the decision tree of channel {!r} has {} leaves, too many for the best order of the rules to "
     "be searched for: they stand by their number of leaves; prune more for a smaller tree"
+)
+_VERY_LARGE = (
+    "the decision tree of channel {!r} has {} leaves, too many for its rules to be minimized and "
+    "put in their best order: they keep its conditions; prune more for a smaller tree"
 )
 
 #: Where of all the work choosing and judging begin.
@@ -219,9 +223,10 @@ def learn_from(
     )
     if options.lags and not evenly_spaced(table):
         notes = (*notes, _UNEVEN.format(table.channel))
-    leaves = sum(1 for _ in trained.tree.paths())
+    leaves = trained.tree.leaves
     if leaves > MOST_LEAVES_IN_BEST_ORDER and options.reductions is not None:
-        notes = (*notes, _LARGE.format(table.channel, leaves))
+        large = _LARGE if leaves <= MOST_LEAVES_MINIMIZED else _VERY_LARGE
+        notes = (*notes, large.format(table.channel, leaves))
     tree, suggestions = accept(tree, suggestions, options)
     learned = as_learned(table, trained, tree, policy.ccp_alpha, figures, options)
     ranges = shown_rows(learned_from, trained)

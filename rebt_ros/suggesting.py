@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from rebt_ros.algorithms.lat_occurrences import rows
-from rebt_ros.algorithms.lat_trees import Demonstrated, gen_lat_trees
+from rebt_ros.algorithms.lat_trees import Demonstrated, LatTrees, gen_lat_trees
+from rebt_ros.algorithms.priority_root import MOST_LEAVES_MINIMIZED
 from rebt_ros.algorithms.re_bt_espresso import build_inv_set, logic_minimizer, reduce_floats
 from rebt_ros.algorithms.rules import dt_to_rules_psa
 from rebt_ros.algorithms.suggestions import (
@@ -33,6 +34,10 @@ _MOST_ROUTINES = 8
 #: Repeaters of single loops, in the paper's mode and beside routines: where no routines are found,
 #: rows are samples, and an action that is done for long is no loop.
 _MOST_LOOPS, _LOOPS_BESIDE_ROUTINES = 24, 4
+_TOO_LARGE = (
+    f"no PSA nodes and LAT trees are suggested for more than {MOST_LEAVES_MINIMIZED} leaves: prune "
+    "more"
+)
 
 #: Rows in which LAT paths are counted: what has not occurred in so many is no habit, and counting
 #: nested loops takes longer than learning does in many more.
@@ -77,7 +82,7 @@ def suggest(
         At most twelve suggestions, routines first, then the best supported (all of them in the
         paper's mode), and notes on what was left out.
     """
-    psa_rules = reduce_floats(logic_minimizer(dt_to_rules_psa(trained.tree, options.delta)))
+    found = routine_suggestions(routines[:_MOST_ROUTINES])
     with_lat = trained
     if not trained.uses_last_action:
         fitted = fitted or fit(
@@ -88,21 +93,13 @@ def suggest(
             upsample=options.upsample,
         )
         with_lat = fitted.at(ccp_alpha)
-    rules = dt_to_rules_psa(with_lat.tree, options.delta)
-    inv_set = build_inv_set(rules)
-    lat_trees = gen_lat_trees(
-        reduce_floats(logic_minimizer(rules)),
-        demonstrated or demonstrated_in(table),
-        inv_set=inv_set,
-        least_support=0 if options.is_paper else 1,
-        most_loops=_MOST_LOOPS if options.is_paper else _LOOPS_BESIDE_ROUTINES * bool(routines),
-    )
-    offered = (
-        *psa_suggestions(psa_rules),
-        *lat_suggestions((*lat_trees.trees, *lat_trees.loops)),
-    )
+    if (
+        not options.is_paper
+        and max(trained.tree.leaves, with_lat.tree.leaves) > MOST_LEAVES_MINIMIZED
+    ):
+        return found, (_TOO_LARGE,)
+    offered, lat_trees = _of_rules(table, trained, with_lat, options, routines, demonstrated)
     left_out = lat_trees.left_out.paths + lat_trees.left_out.loops
-    found = routine_suggestions(routines[:_MOST_ROUTINES])
     room = _MOST_SUGGESTIONS - len(found)
     if not options.is_paper and len(offered) > room:
         loops = {tree.subtree for tree in lat_trees.loops}
@@ -115,6 +112,40 @@ def suggest(
     if len(table) > _MOST_ROWS:
         notes = (*notes, f"suggestions were counted in the first {_MOST_ROWS} rows alone")
     return offered, notes
+
+
+def _of_rules(
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    with_lat: TrainedTree,
+    options: LearnOptions,
+    routines: Sequence[FoundRoutine],
+    demonstrated: Demonstrated | None,
+) -> tuple[tuple[Suggestion, ...], LatTrees]:
+    """PSA and LAT suggestions, and the LAT trees that they are made of.
+
+    Args:
+        table: The rows that were learned from.
+        trained: The decision tree of the main tree.
+        with_lat: The one that may test LAT.
+        options: How to learn.
+        routines: Which there are.
+        demonstrated: What was done in the table, if that is known.
+    """
+    psa_rules = reduce_floats(logic_minimizer(dt_to_rules_psa(trained.tree, options.delta)))
+    rules = dt_to_rules_psa(with_lat.tree, options.delta)
+    lat_trees = gen_lat_trees(
+        reduce_floats(logic_minimizer(rules)),
+        demonstrated or demonstrated_in(table),
+        inv_set=build_inv_set(rules),
+        least_support=0 if options.is_paper else 1,
+        most_loops=_MOST_LOOPS if options.is_paper else _LOOPS_BESIDE_ROUTINES * bool(routines),
+    )
+    offered = (
+        *psa_suggestions(psa_rules),
+        *lat_suggestions((*lat_trees.trees, *lat_trees.loops)),
+    )
+    return offered, lat_trees
 
 
 def accept(

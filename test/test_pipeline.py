@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rebt_ros
-from rebt_ros import evaluation, pipeline
+from rebt_ros import evaluation, pipeline, suggesting
 from rebt_ros.algorithms import priority_root
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
@@ -169,9 +169,24 @@ def test_a_tree_too_large_for_the_best_order_of_rules_is_equivalent_and_says_so(
     chosen = evaluation.teacher_forced_choices(learning.learned.tree, table)
     assert (chosen == learning.decision_tree.predict(table)).all()
     (note,) = [note for note in learning.notes if "best order" in note]
-    leaves = sum(1 for _ in learning.decision_tree.tree.paths())
+    leaves = learning.decision_tree.tree.leaves
     assert f"{leaves} leaves" in note
     assert "prune more" in note
+
+
+def test_a_tree_too_large_to_be_minimized_is_equivalent_and_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    table = tabulate([turning_and_going("one", 1), there_and_back("two")])[0]
+    for module in (pipeline, priority_root, suggesting):
+        monkeypatch.setattr(module, "MOST_LEAVES_MINIMIZED", 1)
+    monkeypatch.setattr(pipeline, "MOST_LEAVES_IN_BEST_ORDER", 1)
+    learning = learn_from(table)
+    chosen = evaluation.teacher_forced_choices(learning.learned.tree, table)
+    assert (chosen == learning.decision_tree.predict(table)).all()
+    assert learning.learned.suggestions == ()
+    assert [note for note in learning.notes if "keep its conditions" in note]
+    assert [note for note in learning.notes if "no PSA nodes and LAT trees" in note]
 
 
 @pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])

@@ -38,6 +38,8 @@ _MOST_RULES_IN_ANY_ORDER, _MOST_RULES_STEP_BY_STEP = 6, 16
 
 #: In larger decision trees, too, rules are ordered by their number of leaves.
 MOST_LEAVES_IN_BEST_ORDER = 500
+#: Rules of yet larger ones keep the decision tree's conditions: espresso would take minutes.
+MOST_LEAVES_MINIMIZED = 2000
 
 #: Nodes of any rule that has a condition: a Sequence of the condition and an action.
 _LEAST_COST = 3
@@ -84,12 +86,14 @@ def reduced_tree(
 
     @cache
     def condition(rule: int, earlier: frozenset[int]) -> Parts:
-        later = [one for one in range(len(rules)) if one != rule and one not in earlier]
-        minimized = minimized_cover(
-            inside[rule],
-            dont_care=[*_joined(inside, sorted(earlier)), *impossible],
-            off=_joined(outside, later),
-        )
+        minimized: Sequence[Codes] = inside[rule]
+        if leaves <= MOST_LEAVES_MINIMIZED:
+            later = [one for one in range(len(rules)) if one != rule and one not in earlier]
+            minimized = minimized_cover(
+                inside[rule],
+                dont_care=[*_joined(inside, sorted(earlier)), *impossible],
+                off=_joined(outside, later),
+            )
         return (factored if reductions.repeated_factoring else pulled_out)(
             reduced(minimized, implied)
         )

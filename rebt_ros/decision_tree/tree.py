@@ -56,6 +56,11 @@ class DecisionTree:
             depth += 1
         return depth
 
+    @property
+    def leaves(self) -> int:
+        """Number of leaves."""
+        return sum(isinstance(node, Leaf) for node in self.walk())
+
     def walk(self) -> Iterator[DecisionNode]:
         """All nodes, each before its branches and ``if_true`` before ``if_false``."""
         waiting = [self.root]
