@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -221,12 +221,6 @@ def learn_from(
         routines,
         fitted=None if options.refit else policy.with_last_action,
     )
-    if options.lags and not evenly_spaced(table):
-        notes = (*notes, _UNEVEN.format(table.channel))
-    leaves = trained.tree.leaves
-    if leaves > MOST_LEAVES_IN_BEST_ORDER and options.reductions is not None:
-        large = _LARGE if leaves <= MOST_LEAVES_MINIMIZED else _VERY_LARGE
-        notes = (*notes, large.format(table.channel, leaves))
     tree, suggestions = accept(tree, suggestions, options)
     learned = as_learned(table, trained, tree, policy.ccp_alpha, figures, options)
     ranges = shown_rows(learned_from, trained)
@@ -237,8 +231,20 @@ def learn_from(
         table,
         held_out,
         policy,
-        (*trained.notes, *notes),
+        (*trained.notes, *notes, *_cautions(table, trained, options)),
     )
+
+
+def _cautions(
+    table: DemonstrationTable, trained: TrainedTree, options: LearnOptions
+) -> Iterator[str]:
+    """What a user should know about the table and the decision tree."""
+    if options.lags and not evenly_spaced(table):
+        yield _UNEVEN.format(table.channel)
+    leaves = trained.tree.leaves
+    if leaves > MOST_LEAVES_IN_BEST_ORDER and options.reductions is not None:
+        large = _LARGE if leaves <= MOST_LEAVES_MINIMIZED else _VERY_LARGE
+        yield large.format(table.channel, leaves)
 
 
 def figures_of(
