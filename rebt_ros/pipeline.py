@@ -242,9 +242,12 @@ def _cautions(
     if options.lags and not evenly_spaced(table):
         yield _UNEVEN.format(table.channel)
     leaves = trained.tree.leaves
-    if leaves > MOST_LEAVES_IN_BEST_ORDER and options.reductions is not None:
-        large = _LARGE if leaves <= MOST_LEAVES_MINIMIZED else _VERY_LARGE
-        yield large.format(table.channel, leaves)
+    if options.reductions is None or leaves <= MOST_LEAVES_IN_BEST_ORDER:
+        return
+    if leaves <= MOST_LEAVES_MINIMIZED:
+        yield _LARGE.format(table.channel, leaves)
+    else:
+        yield _VERY_LARGE.format(table.channel, leaves)
 
 
 def figures_of(
