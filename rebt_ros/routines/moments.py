@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.demonstration.table import DemonstrationTable
 
 #: Positions of actions in the order in which they were done.
@@ -51,11 +51,15 @@ def moments(table: DemonstrationTable) -> Moments:
     if len(table) > 1:
         # What was before tells rows of one state apart.
         now = [place for place, feature in enumerate(table.features) if not feature.lag]
-        states = table.states[:, now]
-        same = (states[1:] == states[:-1]) | (np.isnan(states[1:]) & np.isnan(states[:-1]))
-        # Without a state there is but the time to tell moments apart.
-        alike = same.all(axis=1) if now else np.diff(table.stamps) == 0
-        begins[1:] = ~alike | (np.diff(table.demonstration) != 0)
+        alike: BoolArray = np.diff(table.demonstration) == 0
+        if not now:
+            # Without a state there is but the time to tell moments apart.
+            alike &= np.diff(table.stamps) == 0
+        # One by one, as large tables fill the memory.
+        for column in now:
+            after, before = table.states[1:, column], table.states[:-1, column]
+            alike &= (after == before) | (np.isnan(after) & np.isnan(before))
+        begins[1:] = ~alike
     first = np.flatnonzero(begins)
     last = np.append(first[1:], len(table))
     if len(first) > _MOST_MOMENTS:
