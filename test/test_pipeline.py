@@ -174,6 +174,20 @@ def test_a_tree_too_large_for_the_best_order_of_rules_is_equivalent_and_says_so(
     assert "prune more" in note
 
 
+def test_in_large_tables_suggestions_are_counted_in_the_first_rows_which_is_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    table = tabulate([there_and_back("one", rounds=60)])[0]
+    everything = {one.id: one.support for one in learn_from(table).learned.suggestions}
+    monkeypatch.setattr(suggesting, "_MOST_ROWS", len(table) // 2)
+    learning = learn_from(table)
+    assert "first" in learning.notes[-1]
+    assert str(len(table) // 2) in learning.notes[-1]
+    counted = {one.id: one.support for one in learning.learned.suggestions}
+    assert counted
+    assert all(support < everything[one] for one, support in counted.items())
+
+
 def test_a_tree_too_large_to_be_minimized_is_equivalent_and_says_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
