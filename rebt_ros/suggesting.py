@@ -83,6 +83,8 @@ def suggest(
         paper's mode), and notes on what was left out.
     """
     found = routine_suggestions(routines[:_MOST_ROUTINES])
+    if _too_large(trained, options):
+        return found, (_TOO_LARGE,)
     with_lat = trained
     if not trained.uses_last_action:
         fitted = fitted or fit(
@@ -93,10 +95,7 @@ def suggest(
             upsample=options.upsample,
         )
         with_lat = fitted.at(ccp_alpha)
-    if (
-        not options.is_paper
-        and max(trained.tree.leaves, with_lat.tree.leaves) > MOST_LEAVES_MINIMIZED
-    ):
+    if _too_large(with_lat, options):
         return found, (_TOO_LARGE,)
     offered, lat_trees = _of_rules(table, trained, with_lat, options, routines, demonstrated)
     left_out = lat_trees.left_out.paths + lat_trees.left_out.loops
@@ -112,6 +111,11 @@ def suggest(
     if len(table) > _MOST_ROWS:
         notes = (*notes, f"suggestions were counted in the first {_MOST_ROWS} rows alone")
     return offered, notes
+
+
+def _too_large(trained: TrainedTree, options: LearnOptions) -> bool:
+    """Whether minimizing the rules of a tree would take minutes; the paper's mode does it."""
+    return not options.is_paper and trained.tree.leaves > MOST_LEAVES_MINIMIZED
 
 
 def _of_rules(

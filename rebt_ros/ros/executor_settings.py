@@ -8,7 +8,7 @@ from pathlib import Path
 from rclpy.node import Node
 
 from rebt_ros.ros.novelty_guard import Novelty
-from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.parameters import Parameters, nanoseconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def declare_settings(node: Node) -> ExecutorSettings:
         tree_file=Path(tree_file).expanduser() if tree_file else None,
         rate=rate,
         tick_on_state=tick_on == "state",
-        state_timeout=_nanoseconds(state_timeout),
+        state_timeout=nanoseconds(state_timeout),
         state_topic=declare.text(
             "state_topic", "state", "State topic of a tree that was learned from a table."
         )(),
@@ -126,7 +126,7 @@ def _takeover(declare: Parameters) -> TakeoverSettings:
         0.0,
         3600.0,
     )()
-    return TakeoverSettings(topics if timeout else (), _nanoseconds(timeout))
+    return TakeoverSettings(topics if timeout else (), nanoseconds(timeout))
 
 
 def _novelty(declare: Parameters) -> NoveltySettings:
@@ -146,7 +146,3 @@ def _novelty(declare: Parameters) -> NoveltySettings:
         100.0,
     )()
     return NoveltySettings(Novelty(mode), margin)
-
-
-def _nanoseconds(seconds: float) -> int:
-    return round(seconds * 1e9)

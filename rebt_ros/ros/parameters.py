@@ -160,3 +160,8 @@ def _allowed(descriptor: ParameterDescriptor) -> str:
     for span in (*descriptor.integer_range, *descriptor.floating_point_range):
         return f"in [{span.from_value:g}, {span.to_value:g}]"
     return str(descriptor.additional_constraints)
+
+
+def nanoseconds(seconds: float) -> int:
+    """A duration as clocks and stamps count it."""
+    return round(seconds * 1e9)

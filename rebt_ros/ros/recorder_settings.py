@@ -10,7 +10,7 @@ from rclpy.node import Node
 
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.errors import OptionError
-from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.parameters import Parameters, nanoseconds
 from rebt_ros.ros.sending_time import PairBy
 
 
@@ -114,10 +114,10 @@ def declare_settings(node: Node) -> RecorderSettings:
         sample_rate=sample_rate or None,
         recording=declare.flag("recording", True, "Whether to record from the start.")(),
         best_effort=reliability == "sensor_data",
-        reorder_window=round(window * 1e9),
+        reorder_window=nanoseconds(window),
         # A grid of samples, and taking messages as they come, know of the present only.
         pair_by=PairBy.RECEIVED if sample_rate or not window else PairBy(pair_by),
-        state_wait=round(state_wait * 1e9),
+        state_wait=nanoseconds(state_wait),
         sync_period=declare.number(
             "sync_period",
             0.0,

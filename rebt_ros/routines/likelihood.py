@@ -107,9 +107,9 @@ class Models:
             self._place(number, one, action[number], stream_of[number])
         self._enters[:, 0] = self._first
         follows = np.append(stream_of + 1, np.zeros((count, 1), dtype=np.int64), axis=1)
-        #: One where a state is of a stream, shape (P, T, S), and transposed.
-        self._of_stream = _marks(stream_of, streams).swapaxes(1, 2)
-        self._to_stream = np.ascontiguousarray(self._of_stream.swapaxes(1, 2))
+        #: One where a state is of a stream, shape (P, S, T), and transposed.
+        self._to_stream = _marks(stream_of, streams)
+        self._of_stream = np.ascontiguousarray(self._to_stream.swapaxes(1, 2))
         #: One where the streams from one on may take over from a state, shape (P, R, U).
         self._follows = _marks(follows, streams + 1)
         self._of_border = np.ascontiguousarray(_marks(self._border, borders).swapaxes(1, 2))
