@@ -152,7 +152,11 @@ class NodeProcess:
         That takes the few milliseconds in which `env` starts.
         """
         wait_until(
-            lambda: any(self._has(kind, number) for kind in ("SigBlk", "SigCgt", "SigIgn")),
+            lambda: (
+                self._has("SigBlk", number)
+                or self._has("SigCgt", number)
+                or self.process.poll() is not None
+            ),
             meanwhile=lambda: None,
         )
 

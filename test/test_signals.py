@@ -19,7 +19,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
-from ros_processes import NodeProcess, own_domain, wait_until
+from ros_processes import NodeProcess, command_of, own_domain, wait_until
 
 from rebt_ros.ros.entry import NODES
 from rebt_ros.simulation.experiment_config import Act, Check, Group, GroupKind
@@ -99,6 +99,17 @@ def test_a_signal_at_any_moment_ends_a_node_in_order(
             _wait_for_moment(moment, process)
             process.process.send_signal(number)
             _ended_in_order(process)
+
+
+def test_a_node_that_was_started_to_ignore_sigint_ends_by_it_all_the_same(
+    domain: int, tmp_path: Path
+) -> None:
+    """As in a script's background job, where a launch stops its nodes by SIGINT."""
+    ignoring = ["/usr/bin/env", "--ignore-signal=INT", *command_of("recorder")]
+    with NodeProcess("recorder_node", domain, tmp_path, command=ignoring) as process:
+        process.catches(signal.SIGINT)
+        process.process.send_signal(signal.SIGINT)
+        _ended_in_order(process)
 
 
 @pytest.mark.parametrize("node", NODES)

@@ -25,8 +25,8 @@ from rebt_ros.logic.domain import infeasible, spelled_out
 from rebt_ros.logic.factoring import Factored, Parts, factored, named, pulled_out
 from rebt_ros.logic.float_reduction import implied_literals, reduced
 from rebt_ros.logic.intervals import enclosing_literals, intervals_among, with_intervals
-from rebt_ros.logic.minimize import minimized_cover
-from rebt_ros.logic.numbered import Codes, Cover, Numbering
+from rebt_ros.logic.minimize import cubes, minimized_cover
+from rebt_ros.logic.numbered import Codes, Numbering
 
 #: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and
 #: entanglement make espresso take minutes there.
@@ -77,22 +77,26 @@ def reduced_tree(
     leaves = sum(len(rule.dnf) for rule in rules)
     numbering = Numbering(conditions_of(_union(rule.dnf for rule in rules)))
     implied = implied_literals(numbering.conditions)
-    inside = [numbering.cover(rule.dnf) for rule in rules]
-    impossible: list[Codes] = []
+    covers = [numbering.cover(rule.dnf) for rule in rules]
+    is_minimized = leaves <= MOST_LEAVES_MINIMIZED
+    width = len(numbering.conditions)
+    inside = [cubes(one, width) for one in covers] if is_minimized else []
+    impossible = cubes((), width)
     outside = inside
     if reductions.domain and leaves <= MOST_LEAVES_BY_DOMAIN:
-        impossible = numbering.cover(infeasible(numbering.conditions))
-        outside = [numbering.cover(spelled_out(rule.dnf, numbering.conditions)) for rule in rules]
+        impossible = cubes(numbering.cover(infeasible(numbering.conditions)), width)
+        spelled = (spelled_out(rule.dnf, numbering.conditions) for rule in rules)
+        outside = [cubes(numbering.cover(one), width) for one in spelled]
 
     @cache
     def condition(rule: int, earlier: frozenset[int]) -> Parts:
-        minimized: Sequence[Codes] = inside[rule]
-        if leaves <= MOST_LEAVES_MINIMIZED:
+        minimized: Sequence[Codes] = covers[rule]
+        if is_minimized:
             later = [one for one in range(len(rules)) if one != rule and one not in earlier]
             minimized = minimized_cover(
                 inside[rule],
-                dont_care=[*_joined(inside, sorted(earlier)), *impossible],
-                off=_joined(outside, later),
+                dont_care=[*(inside[one] for one in sorted(earlier)), impossible],
+                off=[outside[one] for one in later],
             )
         return (factored if reductions.repeated_factoring else pulled_out)(
             reduced(minimized, implied)
@@ -155,10 +159,6 @@ def _cheapest(
         if costs[rule] == _LEAST_COST:
             break
     return min(costs, key=costs.__getitem__)
-
-
-def _joined(covers: Sequence[Cover], chosen: Iterable[int]) -> list[Codes]:
-    return [codes for one in chosen for codes in covers[one]]
 
 
 def _child(

@@ -6,8 +6,10 @@ symbolic expressions: those would have to be built, ordered and taken apart agai
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import chain
+from operator import itemgetter
 from typing import TypeAlias
 
 from pyeda.boolalg.espresso import DTYPE, FTYPE, RTYPE, espresso
@@ -21,12 +23,13 @@ _NEGATIVE, _POSITIVE, _ABSENT = 1, 2, 3
 _OFF, _ON, _DONT_CARE = 0, 1, 2
 
 #: Place of each value of an input in the order in which cubes are read: positive ones come first.
-_RANK = {_POSITIVE: 0, _NEGATIVE: 1, _ABSENT: 2}
+_RANK = bytes.maketrans(bytes((_POSITIVE, _NEGATIVE, _ABSENT)), bytes(range(3)))
 
 _Cube: TypeAlias = tuple[int, ...]
 
 #: ``a b | ~a ~b | a c``, where ``~b c`` could stand for ``a c``.
-_EITHER_WAY = {((2, 2, 3), (_ON,)), ((1, 1, 3), (_ON,)), ((2, 3, 2), (_ON,))}
+_EITHER_WAY = [((1, 1, 3), (_ON,)), ((2, 2, 3), (_ON,)), ((2, 3, 2), (_ON,))]
+_UNCHANGED = set(_EITHER_WAY)
 
 
 def minimize(dnf: Dnf, dont_care: Dnf = FALSE, off: Dnf | None = None) -> Dnf:
@@ -45,41 +48,74 @@ def minimize(dnf: Dnf, dont_care: Dnf = FALSE, off: Dnf | None = None) -> Dnf:
     """
     given = Dnf(dnf.conjunctions + dont_care.conjunctions + (off or FALSE).conjunctions)
     numbering = Numbering(conditions_of(given))
-    minimized = minimized_cover(
-        numbering.cover(dnf),
-        numbering.cover(dont_care),
-        None if off is None else numbering.cover(off),
+    on, free, never = (
+        cubes(numbering.cover(one), len(numbering.conditions))
+        for one in (dnf, dont_care, off or FALSE)
     )
-    return numbering.dnf(minimized)
+    return numbering.dnf(minimized_cover(on, [free], None if off is None else [never]))
 
 
-def minimized_cover(on: Cover, dont_care: Cover = (), off: Cover | None = None) -> list[Codes]:
-    """`minimize` in numbers."""
-    if not on or not all(on):
+@dataclass(frozen=True, slots=True)
+class Cubes:
+    """A cover as espresso wants it, made ready once for many minimizations."""
+
+    conditions: tuple[int, ...]
+    """Positions of those that it tests, in the order in which they occur."""
+    inputs: tuple[bytes, ...]
+    """Of each conjunction, the value of every condition that there is."""
+    always: bool
+    """Whether a conjunction is empty, and so holds everywhere."""
+
+
+def cubes(cover: Cover, conditions: int) -> Cubes:
+    """Makes a cover ready.
+
+    Args:
+        cover: The conjunctions.
+        conditions: How many there are in the vocabulary of the codes.
+    """
+    absent = bytes([_ABSENT]) * conditions
+    inputs = []
+    for codes in cover:
+        cube = bytearray(absent)
+        for code in codes:
+            cube[code >> 1] = _POSITIVE if code & 1 else _NEGATIVE
+        inputs.append(bytes(cube))
+    tested = dict.fromkeys(code >> 1 for codes in cover for code in codes)
+    return Cubes(tuple(tested), tuple(inputs), not all(cover))
+
+
+def minimized_cover(
+    on: Cubes, dont_care: Sequence[Cubes] = (), off: Sequence[Cubes] | None = None
+) -> list[Codes]:
+    """`minimize` in numbers; what is free, and what must not hold, may be in several parts."""
+    if not on.inputs or on.always:
         # Espresso has no cubes of zero inputs.
-        return [()] if on else []
-    if off is not None and not off:
+        return [()] if on.inputs else []
+    if off is not None and not any(one.inputs for one in off):
         return [()]
-    given = dict.fromkeys(chain.from_iterable(chain(on, dont_care, off or ())))
-    vocabulary = tuple(dict.fromkeys(code >> 1 for code in given))
-    place = {condition: place for place, condition in enumerate(vocabulary)}
-    cover = [(_cube(codes, place), (_ON,)) for codes in on]
-    cover += [(_cube(codes, place), (_DONT_CARE,)) for codes in dont_care]
+    given = (on, *dont_care, *(off or ()))
+    vocabulary = tuple(dict.fromkeys(chain.from_iterable(one.conditions for one in given)))
+    pick = _picking(vocabulary)
+    cover = [(pick(cube), (_ON,)) for cube in on.inputs]
+    cover += [(pick(cube), (_DONT_CARE,)) for one in dont_care for cube in one.inputs]
     kinds = FTYPE | DTYPE
     if off is not None:
-        cover += [(_cube(codes, place), (_OFF,)) for codes in off]
+        cover += [(pick(cube), (_OFF,)) for one in off for cube in one.inputs]
         kinds |= RTYPE
     _rewind()
     minimized = espresso(len(vocabulary), 1, cover, kinds)
+    negative = [2 * condition for condition in vocabulary]
     # Cubes that test the first conditions of the vocabulary come first, positive ones before.
-    cubes = sorted((inputs for inputs, _ in minimized), key=_reading_order)
     return [
         tuple(
-            2 * condition + (value == _POSITIVE)
-            for condition, value in zip(vocabulary, cube, strict=True)
-            if value != _ABSENT
+            [
+                code + (value == _POSITIVE)
+                for code, value in zip(negative, cube, strict=True)
+                if value != _ABSENT
+            ]
         )
-        for cube in cubes
+        for cube in sorted((inputs for inputs, _ in minimized), key=_reading_order)
     ]
 
 
@@ -91,16 +127,17 @@ def _rewind() -> None:
     unchanged only in the turn before the one that a new process begins with.
     """
     for _ in range(2):
-        if espresso(3, 1, sorted(_EITHER_WAY), FTYPE | DTYPE) == _EITHER_WAY:
+        if espresso(3, 1, _EITHER_WAY, FTYPE | DTYPE) == _UNCHANGED:
             return
 
 
-def _reading_order(cube: _Cube) -> list[int]:
-    return [_RANK[value] for value in cube]
+def _reading_order(cube: _Cube) -> bytes:
+    return bytes(cube).translate(_RANK)
 
 
-def _cube(codes: Codes, place: Mapping[int, int]) -> _Cube:
-    cube = [_ABSENT] * len(place)
-    for code in codes:
-        cube[place[code >> 1]] = _POSITIVE if code & 1 else _NEGATIVE
-    return tuple(cube)
+def _picking(places: tuple[int, ...]) -> Callable[[bytes], _Cube]:
+    """Takes the values at these places; one or more."""
+    if len(places) == 1:
+        return lambda cube: (cube[places[0]],)
+    pick: Callable[[bytes], _Cube] = itemgetter(*places)
+    return pick
