@@ -83,8 +83,9 @@ def suggest(
         paper's mode), and notes on what was left out.
     """
     found = routine_suggestions(routines[:_MOST_ROUTINES])
+    left_out = len(routines) - len(found)
     if _too_large(trained, options):
-        return found, (_TOO_LARGE,)
+        return found, (_TOO_LARGE, *_on_left_out(left_out))
     with_lat = trained
     if not trained.uses_last_action:
         fitted = fitted or fit(
@@ -96,21 +97,26 @@ def suggest(
         )
         with_lat = fitted.at(ccp_alpha)
     if _too_large(with_lat, options):
-        return found, (_TOO_LARGE,)
+        return found, (_TOO_LARGE, *_on_left_out(left_out))
     offered, lat_trees = _of_rules(table, trained, with_lat, options, routines, demonstrated)
-    left_out = lat_trees.left_out.paths + lat_trees.left_out.loops
+    left_out += lat_trees.left_out.paths + lat_trees.left_out.loops
     room = _MOST_SUGGESTIONS - len(found)
     if not options.is_paper and len(offered) > room:
         loops = {tree.subtree for tree in lat_trees.loops}
         ranked = sorted(offered, key=lambda one: (one.subtree not in loops, -one.support))
         left_out += len(ranked) - room
         offered = tuple(ranked[:room])
-    left_out += len(routines) - len(found)
-    offered = (*found, *offered)
-    notes = (f"{left_out} more, less supported suggestions are left out",) if left_out else ()
+    notes = _on_left_out(left_out)
     if len(table) > _MOST_ROWS:
         notes = (*notes, f"suggestions were counted in the first {_MOST_ROWS} rows alone")
-    return offered, notes
+    return (*found, *offered), notes
+
+
+def _on_left_out(suggestions: int) -> tuple[str, ...]:
+    """The note on so many."""
+    if not suggestions:
+        return ()
+    return (f"{suggestions} more, less supported suggestions are left out",)
 
 
 def _too_large(trained: TrainedTree, options: LearnOptions) -> bool:

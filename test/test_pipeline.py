@@ -11,18 +11,21 @@ import pytest
 import rebt_ros
 from rebt_ros import evaluation, pipeline, suggesting
 from rebt_ros.algorithms import priority_root
+from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.decision_tree.training import train
 from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
-from rebt_ros.options import LearnOptions, Use
+from rebt_ros.options import DEFAULTS, LearnOptions, Use
 from rebt_ros.pipeline import (
     learn,
     learn_from,
     summary_sentence,
 )
+from rebt_ros.routines.finding import FoundRoutine
 from rebt_ros.storage.inputs import InputOptions
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -201,6 +204,20 @@ def test_a_tree_too_large_to_be_minimized_is_equivalent_and_says_so(
     assert learning.learned.suggestions == ()
     assert [note for note in learning.notes if "keep its conditions" in note]
     assert [note for note in learning.notes if "no PSA nodes and LAT trees" in note]
+
+
+def test_routines_that_are_left_out_are_counted_also_where_the_tree_is_too_large(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    table = tabulate([there_and_back("one")])[0]
+    trained = train(table, last_action=False)
+    subtree = nodes.Sequence((nodes.Action("go", "action"), nodes.Action("turn", "action")))
+    routines = [FoundRoutine(subtree, support, support) for support in range(10, 0, -1)]
+    monkeypatch.setattr(suggesting, "MOST_LEAVES_MINIMIZED", 0)
+    offered, notes = suggesting.suggest(table, trained, 0.0, DEFAULTS, routines)
+    assert [one.support for one in offered] == list(range(10, 2, -1))
+    assert notes[0].startswith("no PSA nodes and LAT trees")
+    assert notes[1:] == ("2 more, less supported suggestions are left out",)
 
 
 @pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])
