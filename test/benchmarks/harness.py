@@ -4,8 +4,8 @@ limit
     What cannot be beaten by much, or a peer that does the same, measured in the same run.
 ratio
     Our least measurement by the limit's least one: the runs that other work on the machine
-    disturbed least.  Where a row is no comparison, it is the measurement itself; of peak memory,
-    which nothing disturbs, it is the largest one.
+    disturbed least.  Where a row is no comparison, it is the measurement itself: of peak memory
+    and of worst cases the largest one.
 """
 
 from __future__ import annotations

@@ -6,10 +6,10 @@ import math
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from examples import table
 from harness import (
     Figure,
@@ -35,6 +35,8 @@ from rebt_ros.pipeline import learn_from
 _LEARNER = Path(__file__).with_name("learner.py")
 #: Seconds after which a worst case has failed.
 _LONGEST = 120.0
+#: How much of something growth is measured with.
+_FACTORS = (1.0, 10**0.5, 10.0)
 
 
 def relearn(settings: Settings) -> list[Figure]:
@@ -123,32 +125,31 @@ def rules(settings: Settings) -> list[Figure]:
 
 
 def growth(settings: Settings) -> list[Figure]:
-    """How the time of learning grows with ten times as much."""
+    """How the time of learning grows up to ten times as much of something."""
     options = LearnOptions(max_depth=8)
-    base = Case(settings.size(4000, 400), 6, actions=6, options=options)
+    base = Case(settings.size(20_000, 400), 6, actions=6, options=options)
+    # So many that what does not depend on their number is little beside the rest.
+    many = replace(base, rows=settings.size(100_000, 800))
+    cases: dict[str, Callable[[float], Case]] = {
+        "rows": lambda factor: replace(many, rows=round(factor * many.rows)),
+        "features": lambda factor: replace(base, width=round(factor * base.width)),
+        "actions": lambda factor: replace(base, actions=round(factor * base.actions)),
+    }
     figures = [
-        _exponent(name, goal, settings, partial(_learns, base), partial(_learns, more))
-        for name, goal, more in (
-            ("rows", 1.15, replace(base, rows=10 * base.rows)),
-            ("features", 1.15, replace(base, width=10 * base.width)),
-            ("actions", 1.15, replace(base, actions=10 * base.actions)),
-        )
+        _exponent(name, settings, {factor: _learns(case(factor)) for factor in _FACTORS})
+        for name, case in cases.items()
     ]
     rows = table(settings.size(20_000, 500), 10, noise=0.3)
     fitted = fit(rows, last_action=False)
     alphas = fitted.path.alphas
-    few = alphas[:: len(alphas) // max(len(alphas) // 10, 1)]
-    return [
-        *figures,
-        _exponent(
-            f"levels to judge ({len(few)} to {len(alphas)})",
-            1.15,
-            settings,
-            lambda: timed(lambda: fitted.agreements(rows, few)),
-            lambda: timed(lambda: fitted.agreements(rows, alphas)),
-            math.log(len(alphas) / len(few)),
-        ),
-    ]
+
+    def judges(factor: float) -> Callable[[], float]:
+        places = np.linspace(0, len(alphas) - 1, round(len(alphas) * factor / _FACTORS[-1]))
+        some = alphas[places.astype(int)]
+        return timed(lambda: fitted.agreements(rows, some))
+
+    name = f"levels to judge, up to {len(alphas)}"
+    return [*figures, _exponent(name, settings, {factor: judges(factor) for factor in _FACTORS})]
 
 
 def _learns(case: Case) -> Callable[[], float]:
@@ -156,31 +157,35 @@ def _learns(case: Case) -> Callable[[], float]:
     return timed(lambda: learn_from(rows, case.options))
 
 
-def _exponent(
-    name: str,
-    goal: float,
-    settings: Settings,
-    less: Callable[[], Callable[[], float]],
-    more: Callable[[], Callable[[], float]],
-    factor: float = math.log(10),
-) -> Figure:
-    spreads = alternate({"less": less(), "more": more()}, min(settings.rounds, 3))
-    exponent = math.log(spreads["more"].least / spreads["less"].least) / factor
-    return Figure(
-        f"growth of time: exponent in {name}", exponent, goal, spreads["more"], spreads["less"], "s"
+def _exponent(name: str, settings: Settings, subjects: dict[float, Callable[[], float]]) -> Figure:
+    """The slope of the time against the factor, both as logarithms, by least squares."""
+    spreads = alternate({str(one): subject for one, subject in subjects.items()}, settings.rounds)
+    least = [one.least for one in spreads.values()]
+    slope = float(np.polyfit(np.log(list(subjects)), np.log(least), 1)[0])
+    first, *_, last = spreads.values()
+    detail = "least: " + ", ".join(
+        f"{seconds:.3g} s at {factor:.2g} x"
+        for factor, seconds in zip(subjects, least, strict=True)
     )
+    return Figure(f"growth of time: exponent in {name}", slope, 1.15, last, first, "s", detail)
 
 
 def worst(settings: Settings) -> list[Figure]:
-    """Each worst case, once: in seconds, against a bound on what it may take."""
+    """Each worst case in seconds, against a bound on what it may take."""
     quick = ("--quick",) if settings.quick else ()
-    return [_bounded(name, quick) for name in CASES if name not in {"relearn", "large"}]
+    return [
+        _bounded(name, quick, settings.rounds) for name in CASES if name not in {"relearn", "large"}
+    ]
 
 
-def _bounded(case: str, quick: tuple[str, ...]) -> Figure:
-    name = f"worst case: {case} (s)"
+def _bounded(case: str, quick: tuple[str, ...], rounds: int) -> Figure:
+    name = f"worst case: {case}"
+    found = []
     try:
-        found = in_a_process(_LEARNER, "ours", case, *quick, timeout=_LONGEST)
+        for _ in range(rounds):
+            found.append(in_a_process(_LEARNER, "ours", case, *quick, timeout=_LONGEST))
     except subprocess.TimeoutExpired:
         return Figure(name, math.inf, _LONGEST, detail=f"not done after {_LONGEST:g} s")
-    return Figure(name, found["seconds"], _LONGEST, detail=str(found["detail"]))
+    took = Spread(tuple(one["seconds"] for one in found))
+    detail = str(found[0]["detail"])
+    return Figure(name, max(took.measured), _LONGEST, took, None, "s", detail)

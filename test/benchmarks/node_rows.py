@@ -68,9 +68,7 @@ def _resident(pid: int) -> float:
 
 def recorder_cpu(settings: Settings) -> list[Figure]:
     """CPU per message of the recorder; a row of recorder.py."""
-    rounds = 1 if settings.quick else settings.rounds
-    found = recorder.cpu(rounds, settings.directory)
-    return [Figure(one.name, one.ratio, one.goal, detail=one.detail) for one in found]
+    return recorder.cpu(1 if settings.quick else settings.rounds, settings.directory)
 
 
 def latency(settings: Settings) -> list[Figure]:

@@ -79,8 +79,4 @@ def _write_bag(path: Path, messages: int, plugin: StoragePlugin) -> None:
 def recording(settings: Settings) -> list[Figure]:
     """A recording into its demonstration; rows of recorder.py."""
     rows = settings.size(1_000_000, 20_000)
-    return [_from_recorder(one) for one in recorder.read(rows, settings.rounds, settings.directory)]
-
-
-def _from_recorder(one: recorder.Figure) -> Figure:
-    return Figure(one.name, one.ratio, one.goal, detail=one.detail)
+    return recorder.read(rows, settings.rounds, settings.directory)

@@ -3,7 +3,7 @@
     PYTHONPATH=.:test python test/benchmarks/recorder.py [--kills N] [--seconds S] [--rounds N]
         [--rows N] [--only kills,load,freezes,relearn,cpu,read]
 
-Prints a table and writes bench-results/recorder.json.  `pandas.read_csv` is a peer in reading where
+Prints tables and writes bench-results/recorder.json.  `pandas.read_csv` is a peer in reading where
 it is installed.
 """
 
@@ -22,11 +22,22 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from statistics import median
 
 import numpy as np
+from harness import (
+    CHECKOUT,
+    Figure,
+    Spread,
+    alternate,
+    in_a_process,
+    peak_memory,
+    table,
+    timed,
+    write,
+)
 from recorder_trials import (
     WIDTH,
     Load,
@@ -42,34 +53,15 @@ from rebt_ros.demonstration.table import tabulate
 from rebt_ros.storage.recording import read_recording
 from rebt_ros.storage.recording_rows import LABEL, record_type
 
-CHECKOUT = Path(__file__).resolve().parents[2]
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One line of the table."""
-
-    name: str
-    ratio: float
-    """What was measured; a ratio of medians where the name says "/", else a number."""
-    goal: float
-    """At most so much."""
-    met: bool
-    detail: str = ""
-
-
-def figure(name: str, value: float, goal: float, detail: str = "") -> Figure:
-    return Figure(name, round(value, 3), goal, value <= goal, detail)
-
 
 def kills(count: int, directory: Path) -> list[Figure]:
     """kill -9 at random moments under 1 kHz states and 50 Hz actions."""
     result = kill_recorders(count, directory, random.Random())
     detail = ", ".join(f"{name} {value}" for name, value in asdict(result).items())
     return [
-        figure(f"acknowledged rows lost in {count} kills", result.lost, 0, detail),
-        figure("gaps within the recordings", result.gaps, 0),
-        figure("torn tails not noticed", result.torn - result.noticed, 0),
+        Figure(f"acknowledged rows lost in {count} kills", result.lost, 0, detail=detail),
+        Figure("gaps within the recordings", result.gaps, 0),
+        Figure("torn tails not noticed", result.torn - result.noticed, 0),
     ]
 
 
@@ -84,9 +76,11 @@ def load(seconds: float, directory: Path) -> list[Figure]:
     )
     sent = result.states + result.actions
     return [
-        figure(f"rows lost in {seconds:g} s of load", result.actions - result.rows, 0, detail),
-        figure("messages dropped", sent - result.messages, 0),
-        figure("growth of memory (MB)", max(settled) - settled[0], 10),
+        Figure(
+            f"rows lost in {seconds:g} s of load", result.actions - result.rows, 0, detail=detail
+        ),
+        Figure("messages dropped", sent - result.messages, 0),
+        Figure("growth of memory (MB)", max(settled) - settled[0], 10),
     ]
 
 
@@ -103,17 +97,17 @@ def freezes(seconds: float, directory: Path) -> list[Figure]:
         f"{result.lost_messages} messages lost"
     )
     return [
-        figure(f"rows lost {name}", result.actions - result.rows, 0, detail),
-        figure(f"rows with another state {name}", result.misplaced, 0),
+        Figure(f"rows lost {name}", result.actions - result.rows, 0, detail=detail),
+        Figure(f"rows with another state {name}", result.misplaced, 0),
     ]
 
 
 def relearn(seconds: float, directory: Path) -> list[Figure]:
     """1 kHz states, 100 Hz actions and ticks, half of the time during a relearn of many rows."""
-    table = directory / "table"
-    table.mkdir()
-    large_recording(1_000_000, table)
-    result = relearn_meanwhile(seconds, directory, table)
+    learned_from = directory / "table"
+    learned_from.mkdir()
+    large_recording(1_000_000, learned_from)
+    result = relearn_meanwhile(seconds, directory, learned_from)
 
     def spread(intervals: list[float]) -> str:
         off = np.abs(np.array(intervals) - 10.0)
@@ -130,33 +124,39 @@ def relearn(seconds: float, directory: Path) -> list[Figure]:
         f"{result.lost_messages} messages lost by the recorder"
     )
     return [
-        figure(
-            "jitter of ticks during a relearn - at rest (p99, ms)", learning - resting, 5, detail
+        Figure(
+            "jitter of ticks during a relearn - at rest (p99, ms)",
+            learning - resting,
+            5,
+            detail=detail,
         ),
-        figure("rows lost", result.actions - result.rows, 0),
-        figure("rows with another state", result.misplaced, 0),
-        figure("commands missed or doubled", result.ticks_without_command + result.missed, 0),
+        Figure("rows lost", result.actions - result.rows, 0),
+        Figure("rows with another state", result.misplaced, 0),
+        Figure("commands missed or doubled", result.ticks_without_command + result.missed, 0),
     ]
 
 
 def cpu(rounds: int, directory: Path) -> list[Figure]:
     """CPU seconds per message at 1 kHz, of the recorder and of empty subscribers in turn."""
-    measured: dict[str, list[float]] = {"single": [], "events": [], "recorder": []}
-    for _ in range(rounds):
-        for subject, costs in measured.items():
-            costs.append(_cost(subject, Path(tempfile.mkdtemp(dir=directory))))
-    best = min(("single", "events"), key=lambda one: median(measured[one]))
-    detail = "; ".join(
-        f"{subject} {min(costs):.0f} / {median(costs):.0f} / {max(costs):.0f} µs"
-        for subject, costs in measured.items()
+    found = alternate(
+        {
+            subject: partial(_cost, subject, directory)
+            for subject in ("recorder", "single", "events")
+        },
+        rounds,
     )
-    ratio = median(measured["recorder"]) / median(measured[best])
-    return [figure(f"CPU per message / empty subscriber ({best} executor)", ratio, 1.2, detail)]
+    ours, single, events = found.values()
+    best, other = sorted(("single", "events"), key=lambda one: found[one].least)
+    name = f"recorder, CPU per message at 1 kHz / empty subscriber ({best} executor)"
+    least = min(single.least, events.least)
+    detail = f"with the {other} executor: {found[other].least:.0f} µs"
+    return [Figure(name, ours.least / least, 1.2, ours, found[best], "µs", detail)]
 
 
 def _cost(subject: str, directory: Path) -> float:
     """Microseconds of CPU per message."""
-    with own_domain() as domain, _subject(subject, domain, directory) as process:
+    own = Path(tempfile.mkdtemp(dir=directory))
+    with own_domain() as domain, _subject(subject, domain, own) as process:
         before = cpu_seconds(process.pid)
         with Load(domain, 1000, 50, WIDTH, 5.0) as publisher:
             while not (sent := publisher.sent()):
@@ -188,39 +188,47 @@ def _subject(subject: str, domain: int, directory: Path) -> Iterator[subprocess.
 
 def read(rows: int, rounds: int, directory: Path) -> list[Figure]:
     """Reading a recording, against numpy alone, and pandas reading the same table as CSV."""
-    small = large_recording(min(rows, 1_000_000), directory)
-    peers: dict[str, Callable[[], object]] = {
-        "read_recording": lambda: read_recording(small),
-        "numpy": lambda: _numpy_alone(small),
+    count = min(rows, 1_000_000)
+    small = large_recording(count, directory)
+    peers = {
+        "ours": _per_million(lambda: read_recording(small), count),
+        "numpy": _per_million(lambda: _numpy_alone(small), count),
     }
     if importlib.util.find_spec("pandas"):
         import pandas
 
-        table = as_csv(small, min(rows, 200_000))
-        peers["pandas"] = lambda: pandas.read_csv(table)
-    measured: dict[str, list[float]] = {name: [] for name in peers}
-    for _ in range(rounds):
-        for name, peer in peers.items():
-            start = time.perf_counter()
-            peer()
-            count = min(rows, 200_000) if name == "pandas" else min(rows, 1_000_000)
-            measured[name].append((time.perf_counter() - start) / count * 1e6)
-    detail = "; ".join(
-        f"{name} {min(one):.2f} / {median(one):.2f} / {max(one):.2f} s per million rows"
-        for name, one in measured.items()
-    )
-    ours = median(measured["read_recording"])
-    figures = [figure("reading / numpy alone", ours / median(measured["numpy"]), 1.2, detail)]
-    if "pandas" in measured:
-        figures.append(figure("reading / pandas.read_csv", ours / median(measured["pandas"]), 1.2))
-    large = large_recording(rows, directory)
-    seconds, reading, joining = _peak_memory(large)
-    detail = f"{rows} rows x {WIDTH} in {seconds:.1f} s"
-    return [
-        *figures,
-        figure("peak memory of reading / table", reading, 4, detail),
-        figure("peak memory of reading and tabulating / table", joining, 4),
+        fewer = min(rows, 200_000)
+        text = as_csv(small, fewer)
+        peers["pandas.read_csv"] = _per_million(lambda: pandas.read_csv(text), fewer)
+    found = alternate(peers, rounds)
+    ours = found.pop("ours")
+    figures = [
+        Figure(
+            f"recording -> table, a million rows / {name}",
+            ours.least / peer.least,
+            1.2,
+            ours,
+            peer,
+            "s",
+        )
+        for name, peer in found.items()
     ]
+    large = large_recording(rows, directory)
+    memory = [in_a_process(Path(__file__), "--memory", str(large)) for _ in range(rounds)]
+    return [*figures, *(_peak(what, memory) for what in ("reading", "reading and tabulating"))]
+
+
+def _per_million(subject: Callable[[], object], rows: int) -> Callable[[], float]:
+    measure = timed(subject)
+    return lambda: measure() / rows * 1e6
+
+
+def _peak(what: str, found: list[dict[str, float]]) -> Figure:
+    peaks = Spread(tuple(one[what] for one in found))
+    detail = f"{found[0]['rows']:,} rows x {WIDTH} in {min(one['seconds'] for one in found):.1f} s"
+    return Figure(
+        f"peak memory of {what} / table", max(peaks.measured), 4, peaks, None, "x", detail
+    )
 
 
 def as_csv(path: Path, rows: int) -> Path:
@@ -245,30 +253,18 @@ def _numpy_alone(path: Path) -> tuple[object, ...]:
     return rows["stamp"].copy(), *codes, np.ascontiguousarray(rows["state"])
 
 
-def _peak_memory(path: Path) -> tuple[float, float, float]:
-    """Seconds of reading; peaks of reading and of tabulating too, as multiples of the table."""
-    answer = subprocess.run(
-        [sys.executable, __file__, "--memory", str(path)], check=True, stdout=subprocess.PIPE
-    )
-    seconds, reading, joining = json.loads(answer.stdout)
-    return seconds, reading, joining
-
-
 def report_memory(path: Path) -> None:
-    """Prints what `_peak_memory` returns; in a process of its own."""
-
-    def peak() -> int:
-        status = Path("/proc/self/status").read_text()
-        return 1024 * int(status.split("VmHWM:")[1].split()[0])
-
-    before = peak()
+    """Prints peaks as multiples of the table, and seconds; in a process of its own."""
+    before = peak_memory()
     start = time.perf_counter()
     demonstration = read_recording(path).demonstration
     seconds = time.perf_counter() - start
-    table = demonstration.states.nbytes
-    reading = (peak() - before) / table
+    size = demonstration.states.nbytes
+    found = {"rows": len(demonstration.states), "seconds": seconds}
+    found["reading"] = (peak_memory() - before) / size
     tabulate([demonstration])
-    print(json.dumps([seconds, reading, (peak() - before) / table]))
+    found["reading and tabulating"] = (peak_memory() - before) / size
+    print(json.dumps(found))
 
 
 def main() -> int:
@@ -299,16 +295,12 @@ def main() -> int:
             found = trials[name](directory)
         finally:
             shutil.rmtree(directory)
+        print(table(found))
         for one in found:
-            print(
-                f"{one.name:60} {one.ratio:10g}  <= {one.goal:<6g} {'met' if one.met else 'MISSED'}"
-            )
             if one.detail:
-                print(f"    {one.detail}", flush=True)
+                print(f"    {one.name}: {one.detail}", flush=True)
         figures += found
-    results = CHECKOUT / "bench-results" / "recorder.json"
-    results.parent.mkdir(exist_ok=True)
-    results.write_text(json.dumps([asdict(one) for one in figures], indent=2) + "\n")
+    write(CHECKOUT / "bench-results" / "recorder.json", figures)
     return 0 if all(one.met for one in figures) else 1
 
 
