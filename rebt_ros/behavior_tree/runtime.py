@@ -58,8 +58,6 @@ class Tick:
     status: Status
     actions: tuple[nodes.Action, ...]
     """Actions that were ticked, in order."""
-    tip: str
-    """What the deepest node that decided says; empty where none did."""
 
 
 def executable(tree: nodes.Node) -> nodes.Node:
@@ -115,8 +113,13 @@ class TreeRuntime:
         # Afterwards, so that all conditions of one tick see the same history.
         for action in self._ticked:
             self.histories[action.channel].take(action.label)
+        return Tick(self.root.status, tuple(self._ticked))
+
+    @property
+    def tip(self) -> str:
+        """What the deepest node that decided in the last tick says; empty where none did."""
         tip = self.root.tip()
-        return Tick(self.root.status, tuple(self._ticked), tip.name if tip else "")
+        return tip.name if tip else ""
 
     def halt(self) -> None:
         """Interrupts whatever runs; the next tick starts afresh, with the same histories."""
@@ -211,12 +214,25 @@ def _parallel(
     return py_trees.composites.Parallel(name, policy, children)
 
 
-class _Test(py_trees.behaviour.Behaviour):
-    """A condition, or its negation: succeeds or fails at once.
+class _Leaf(py_trees.behaviour.Behaviour):
+    """A condition or an action.
 
-    Most of a tree's nodes are conditions.  They never run, have nothing to begin or to end, and so
-    leave out what py_trees does for behaviours that do; what is seen from outside is the same.
+    Most of a tree's nodes are leaves.  Ours have nothing to begin, and so leave out what py_trees
+    does for behaviours that have, and what it would write to a log; what is seen from outside is
+    the same.
     """
+
+    def tick(self) -> Iterator[py_trees.behaviour.Behaviour]:
+        self.status = self.update()
+        yield self
+
+    def stop(self, new_status: Status) -> None:
+        self.terminate(new_status)
+        self.status = new_status
+
+
+class _Test(_Leaf):
+    """A condition, or its negation: succeeds or fails at once."""
 
     def __init__(self, name: str, holds: Callable[[], bool], *, positive: bool) -> None:
         super().__init__(name)
@@ -227,12 +243,8 @@ class _Test(py_trees.behaviour.Behaviour):
     def update(self) -> Status:
         return self._if_true if self._holds() else self._if_false
 
-    def tick(self) -> Iterator[py_trees.behaviour.Behaviour]:
-        self.status = self.update()
-        yield self
 
-
-class _Command(py_trees.behaviour.Behaviour):
+class _Command(_Leaf):
     """An action, carried out by the commander."""
 
     def __init__(

@@ -238,10 +238,10 @@ class ExecutorNode(Node):
         if program is None or topic not in program.inputs.topics:
             return
         # Lagged features look back at ticks that are evenly spaced: those of the timer.
-        if any(feature.lag for feature in program.learned.features):
+        if program.inputs.lagged:
             return
-        self._timer.reset()
         self._tick()
+        self._timer.reset()
 
     def _accept(self, topic: str, *, quietly: bool = False) -> None:
         if self._program is None or topic not in self._program.inputs.topics:
@@ -309,7 +309,7 @@ class ExecutorNode(Node):
         program, now = self._program, self._now()
         if program is None or not self._enabled or self._takeover.lasts(now):
             return
-        self._say_who_drives()
+        self._say_who_drives(now)
         if program.inputs.stale(now) or not self._is_familiar(program):
             self._rest()
             return
@@ -353,10 +353,10 @@ class ExecutorNode(Node):
 
     # --- what it says ---
 
-    def _say_who_drives(self) -> None:
+    def _say_who_drives(self, now: int | None = None) -> None:
         """Tells others, above all the recorder, whether the robot is in the tree's hands."""
         ready = self._enabled and self._program is not None
-        driving = ready and not self._takeover.lasts(self._now())
+        driving = ready and not self._takeover.lasts(self._now() if now is None else now)
         if driving != self._said_to_drive:
             self._said_to_drive = driving
             self._driving.publish(Bool(data=driving))
@@ -391,12 +391,11 @@ class ExecutorNode(Node):
         if self._program is None or not watchers:
             return
         runtime = self._program.runtime
-        tip = runtime.root.tip()
         snapshot = json.dumps(
             {
                 "condition": self._condition().split(":")[0],
                 "status": runtime.root.status.name,
-                "tip": tip.name if tip else "",
+                "tip": runtime.tip,
                 "commands": self._channels.sent,
                 "nodes": runtime.snapshot(),
             },

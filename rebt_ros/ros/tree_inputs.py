@@ -52,11 +52,10 @@ class TreeInputs:
         self._state = [math.nan] * len(learned.features)
         self._timeout = timeout
         self._latest: dict[str, Message] = {}
-
-    @property
-    def topics(self) -> tuple[str, ...]:
+        self.topics = tuple(self._encoder.topics)
         """The state topics that the tree reads."""
-        return tuple(self._encoder.topics)
+        self.lagged = any(feature.lag for feature in learned.features)
+        """Whether the tree looks back at earlier ticks."""
 
     @property
     def values(self) -> Mapping[str, Sequence[float]]:
