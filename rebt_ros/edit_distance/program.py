@@ -110,7 +110,10 @@ def _constraints(pair: Pair) -> tuple[csr_array, np.ndarray]:
     )
     rows += per_image[0].size
     values = np.concatenate([np.full(len(columns), value) for _, columns, value in entries])
-    places = tuple(np.concatenate([entry[axis] for entry in entries]) for axis in (0, 1))
+    # HiGHS counts in 32 bits, and older versions of scipy do not convert.
+    places = tuple(
+        np.concatenate([entry[axis] for entry in entries]).astype(np.int32) for axis in (0, 1)
+    )
     most = np.zeros(rows)
     most[:ones] = 1
     return csr_array((values, places), shape=(rows, x.size + y.size)), most
