@@ -5,11 +5,14 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import networkx as nx
+import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy.optimize import milp
 from strategies import (
     action,
     at_most,
@@ -21,6 +24,7 @@ from strategies import (
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.edit_distance import bounds as bounds_module
+from rebt_ros.edit_distance import program
 from rebt_ros.edit_distance.bounds import (
     Bounds,
     distance_bounds,
@@ -244,6 +248,23 @@ def test_the_integer_program_alone_agrees_with_everything_together(
     first: LabelledTree, second: LabelledTree
 ) -> None:
     assert _bounds_with(first, second, _MOST_STEPS=0) == distance_bounds(first, second)
+
+
+def test_the_solver_gets_indices_that_old_versions_of_scipy_take(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solved = []
+
+    def spied(*args: Any, **kwargs: Any) -> Any:
+        solved.append(kwargs["constraints"].A)
+        return milp(*args, **kwargs)
+
+    monkeypatch.setattr(program, "milp", spied)
+    first, second = LabelledTree(("a", "a"), (-1, 0)), LabelledTree(("a", "b"), (-1, 0))
+    assert _bounds_with(first, second, _MOST_STEPS=0).upper > 0
+    assert {one.dtype for matrix in solved for one in (matrix.indices, matrix.indptr)} == {
+        np.dtype(np.int32)
+    }
 
 
 def _bounds_with(first: LabelledTree, second: LabelledTree, **limits: int) -> Bounds:
