@@ -35,14 +35,15 @@ demo: build ## Demonstrate, learn and let the learned tree drive a simulated rob
 	@. install/local_setup.sh && exec install/rebt_ros/lib/rebt_ros/demo $(ARGS)
 
 # PYTHONSAFEPATH keeps the checkout off Python's path: the tests import what was installed.
-# Two tests run at a time, as they mostly wait for other processes: files stay together.
+# Two tests run at a time, as they mostly wait for other processes: files stay together.  A worker
+# that crashed is not replaced: pytest-xdist may wait for ever then (its issues 784 and 1323).
 # colcon test succeeds when tests fail; colcon test-result and the count do not.
 test: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 test: build ## Run the tests on the built package.
 	@status=0; \
 	PYTHONSAFEPATH=1 $(COLCON) test --packages-select rebt_ros \
 	    --event-handlers console_direct+ $(QUIET) \
-	    --pytest-args -n 2 --dist loadfile || status=$$?; \
+	    --pytest-args -n 2 --dist loadfile --max-worker-restart 0 || status=$$?; \
 	$(COLCON) test-result --test-result-base build/rebt_ros --verbose || status=$$?; \
 	$(VENV_PYTHON) .ci/count_tests.py build/rebt_ros/pytest.xml || status=$$?; \
 	exit $$status
