@@ -12,6 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sklearn.tree import DecisionTreeClassifier
 
+from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.pipeline import learn
 from rebt_ros.simulation.demonstrator import decide
 from rebt_ros.simulation.episode import EpisodeResult, Policy, run_episode
 from rebt_ros.simulation.robot import TIME_STEP, Action, Robot, State
@@ -285,6 +289,24 @@ def test_who_does_not_charge_does_not_arrive_from_a_start_with_a_low_battery() -
 def test_a_decision_tree_drives_as_well_as_the_demonstrator_it_learned_from(shown: range) -> None:
     results = _runs(_learned(shown), FRESH_STARTS)
     assert _reached(results) >= 0.95 * _reached(_runs(decide, FRESH_STARTS))
+
+
+@pytest.mark.parametrize("first", [0, 50, 200])
+def test_a_behavior_tree_drives_as_well_after_as_many_demonstrations_as_the_demo_shows(
+    first: int,
+) -> None:
+    features = tuple(Feature(name) for name in State._fields)
+    demonstrations = []
+    for start in range(first, first + 16):
+        shown = zip(*_demonstrated([start]), strict=True)
+        rows = [Row(t, "action", action, None, state) for t, (state, action) in enumerate(shown)]
+        demonstrations.append(Demonstration.from_rows(str(start), features, rows))
+    runtime = TreeRuntime(learn(demonstrations))
+
+    def policy(state: tuple[float, ...]) -> str:
+        return runtime.tick(state).actions[0].label
+
+    assert _reached(_runs(policy, FRESH_STARTS)) >= 0.95
 
 
 def test_a_learned_tree_still_arrives_when_its_actions_come_late() -> None:

@@ -66,7 +66,7 @@ class Plan:
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="demo", description=__doc__.splitlines()[0])
-    parser.add_argument("--demonstrations", type=int, default=8, help="default: %(default)s")
+    parser.add_argument("--demonstrations", type=int, default=16, help="default: %(default)s")
     parser.add_argument(
         "--trials",
         type=int,
