@@ -236,7 +236,7 @@ def load_recorder(
                 status = peer.diagnostics.get(RECORDER)
                 if status is not last[0]:
                     last[0] = status
-                    memory.append(_resident(recorder.process.pid))
+                    memory.append(resident(recorder.process.pid))
                 return load.sent()
 
             sent = peer.wait_until(ended, seconds * 3 + PATIENCE, "the end of the load")
@@ -410,7 +410,8 @@ def _pass(peer: Peer, seconds: float) -> None:
         return
 
 
-def _resident(pid: int) -> float:
+def resident(pid: int) -> float:
+    """Memory that a process holds (MB)."""
     pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 

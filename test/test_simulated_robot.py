@@ -16,7 +16,7 @@ from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.pipeline import learn
-from rebt_ros.simulation.demonstrator import decide
+from rebt_ros.simulation.demonstrator import ENOUGH, decide
 from rebt_ros.simulation.episode import EpisodeResult, Policy, run_episode
 from rebt_ros.simulation.robot import TIME_STEP, Action, Robot, State
 from rebt_ros.simulation.world import Obstacle, Point, World, furnished_room
@@ -297,7 +297,7 @@ def test_a_behavior_tree_drives_as_well_after_as_many_demonstrations_as_the_demo
 ) -> None:
     features = tuple(Feature(name) for name in State._fields)
     demonstrations = []
-    for start in range(first, first + 16):
+    for start in range(first, first + ENOUGH):
         shown = zip(*_demonstrated([start]), strict=True)
         rows = [Row(t, "action", action, None, state) for t, (state, action) in enumerate(shown)]
         demonstrations.append(Demonstration.from_rows(str(start), features, rows))

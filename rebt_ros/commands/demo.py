@@ -39,6 +39,7 @@ from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.commands.shell import aligned, run, use_color
 from rebt_ros.errors import RebtError
+from rebt_ros.simulation.demonstrator import ENOUGH
 from rebt_ros.storage.atomic import write_text_atomically
 
 #: Starts of the robot that are never shown.
@@ -66,7 +67,7 @@ class Plan:
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="demo", description=__doc__.splitlines()[0])
-    parser.add_argument("--demonstrations", type=int, default=16, help="default: %(default)s")
+    parser.add_argument("--demonstrations", type=int, default=ENOUGH, help="default: %(default)s")
     parser.add_argument(
         "--trials",
         type=int,

@@ -309,7 +309,7 @@ class ExecutorNode(Node):
         program, now = self._program, self._now()
         if program is None or not self._enabled or self._takeover.lasts(now):
             return
-        self._say_who_drives(now)
+        self._say_who_drives()
         if program.inputs.stale(now) or not self._is_familiar(program):
             self._rest()
             return
@@ -353,10 +353,10 @@ class ExecutorNode(Node):
 
     # --- what it says ---
 
-    def _say_who_drives(self, now: int | None = None) -> None:
+    def _say_who_drives(self) -> None:
         """Tells others, above all the recorder, whether the robot is in the tree's hands."""
         ready = self._enabled and self._program is not None
-        driving = ready and not self._takeover.lasts(self._now() if now is None else now)
+        driving = ready and not self._takeover.lasts(self._now())
         if driving != self._said_to_drive:
             self._said_to_drive = driving
             self._driving.publish(Bool(data=driving))

@@ -50,9 +50,13 @@ class Spread:
         return min(self.measured)
 
     @property
+    def most(self) -> float:
+        return max(self.measured)
+
+    @property
     def three(self) -> tuple[float, float, float]:
         """Minimum, median and maximum."""
-        return min(self.measured), median(self.measured), max(self.measured)
+        return self.least, median(self.measured), self.most
 
 
 @dataclass(frozen=True, slots=True)

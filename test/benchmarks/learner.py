@@ -80,7 +80,7 @@ def main() -> None:
         tree.fit(encode(rows, last_action=False), rows.chosen)
     else:
         learning = learn_from(rows, case.options)
-        leaves = sum(1 for _ in learning.decision_tree.tree.paths())
+        leaves = learning.decision_tree.tree.leaves
         found["detail"] = f"{leaves} leaves, {nodes.size(learning.learned.tree)} nodes" + "".join(
             f"; {note}" for note in learning.notes
         )

@@ -75,7 +75,7 @@ def relearn_large(settings: Settings) -> list[Figure]:
         compared(f"relearn, {size} / the same fit", spreads, 8),
         Figure(
             f"peak memory of relearn, {size} / its float32 table",
-            max(memory["ours"].measured),
+            memory["ours"].most,
             4,
             memory["ours"],
             memory["limit"],
@@ -188,4 +188,4 @@ def _bounded(case: str, quick: tuple[str, ...], rounds: int) -> Figure:
         return Figure(name, math.inf, _LONGEST, detail=f"not done after {_LONGEST:g} s")
     took = Spread(tuple(one["seconds"] for one in found))
     detail = str(found[0]["detail"])
-    return Figure(name, max(took.measured), _LONGEST, took, None, "s", detail)
+    return Figure(name, took.most, _LONGEST, took, None, "s", detail)

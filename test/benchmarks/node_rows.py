@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ from typing import Any
 import recorder
 from executor_examples import READS_X
 from harness import Figure, Settings, Spread
+from recorder_trials import resident
 from ros_processes import NodeProcess, Peer, own_domain
 from std_msgs.msg import Float64MultiArray, String
 
@@ -42,7 +42,7 @@ def rest(settings: Settings) -> list[Figure]:
             start = time.perf_counter()
             with _started(kind, domain, settings.directory) as node:
                 seconds = time.perf_counter() - start
-                return seconds, _resident(node.process.pid)
+                return seconds, resident(node.process.pid)
 
         measured: dict[str, list[tuple[float, float]]] = {name: [] for name in _READY}
         for _ in range(settings.rounds):
@@ -59,11 +59,6 @@ def rest(settings: Settings) -> list[Figure]:
             label = f"{what} {name} - that of a bare rclpy node ({unit})"
             figures.append(Figure(label, ours.least - bare.least, goal, ours, bare, unit))
     return figures
-
-
-def _resident(pid: int) -> float:
-    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def recorder_cpu(settings: Settings) -> list[Figure]:

@@ -32,6 +32,7 @@ from harness import (
     Figure,
     Spread,
     alternate,
+    compared,
     in_a_process,
     peak_memory,
     table,
@@ -47,7 +48,7 @@ from recorder_trials import (
     load_recorder,
     relearn_meanwhile,
 )
-from ros_processes import NodeProcess, own_domain
+from ros_processes import NodeProcess, own_domain, wait_until
 
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.storage.recording import read_recording
@@ -145,11 +146,10 @@ def cpu(rounds: int, directory: Path) -> list[Figure]:
         },
         rounds,
     )
-    ours = found["recorder"]
     best, other = sorted(("single", "events"), key=lambda one: found[one].least)
     name = f"recorder, CPU per message at 1 kHz / empty subscriber ({best} executor)"
     detail = f"with the {other} executor: {found[other].least:.0f} µs"
-    return [Figure(name, ours.least / found[best].least, 1.2, ours, found[best], "µs", detail)]
+    return [compared(name, {"ours": found["recorder"], "limit": found[best]}, 1.2, "µs", detail)]
 
 
 def _cost(subject: str, directory: Path) -> float:
@@ -158,8 +158,7 @@ def _cost(subject: str, directory: Path) -> float:
     with own_domain() as domain, _subject(subject, domain, own) as process:
         before = cpu_seconds(process.pid)
         with Load(domain, 1000, 50, WIDTH, 5.0) as publisher:
-            while not (sent := publisher.sent()):
-                time.sleep(0.1)
+            sent = wait_until(publisher.sent, what="the end of the load")
         return (cpu_seconds(process.pid) - before) / sum(sent.values()) * 1e6
 
 
@@ -202,14 +201,7 @@ def read(rows: int, rounds: int, directory: Path) -> list[Figure]:
     found = alternate(peers, rounds)
     ours = found.pop("ours")
     figures = [
-        Figure(
-            f"recording -> table, a million rows / {name}",
-            ours.least / peer.least,
-            1.2,
-            ours,
-            peer,
-            "s",
-        )
+        compared(f"recording -> table, a million rows / {name}", {"ours": ours, "limit": peer}, 1.2)
         for name, peer in found.items()
     ]
     large = large_recording(rows, directory)
@@ -225,9 +217,7 @@ def _per_million(subject: Callable[[], object], rows: int) -> Callable[[], float
 def _peak(what: str, found: list[dict[str, float]]) -> Figure:
     peaks = Spread(tuple(one[what] for one in found))
     detail = f"{found[0]['rows']:,} rows x {WIDTH} in {min(one['seconds'] for one in found):.1f} s"
-    return Figure(
-        f"peak memory of {what} / table", max(peaks.measured), 4, peaks, None, "x", detail
-    )
+    return Figure(f"peak memory of {what} / table", peaks.most, 4, peaks, None, "x", detail)
 
 
 def as_csv(path: Path, rows: int) -> Path:
