@@ -12,15 +12,19 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
     from rebt_ros.decision_tree.upsampling import Upsampling
+    from rebt_ros.demonstration.last_action import History
     from rebt_ros.errors import RebtError
     from rebt_ros.offline import learn, replay
     from rebt_ros.options import LearnOptions, Use
+    from rebt_ros.policy import Policy
     from rebt_ros.storage.inputs import InputOptions
 
 __all__ = [
+    "History",
     "InputOptions",
     "LearnOptions",
     "LearnedTree",
+    "Policy",
     "RebtError",
     "Root",
     "Upsampling",
@@ -30,9 +34,11 @@ __all__ = [
 ]
 
 _HOMES = {
+    "History": "rebt_ros.demonstration.last_action",
     "InputOptions": "rebt_ros.storage.inputs",
     "LearnOptions": "rebt_ros.options",
     "LearnedTree": "rebt_ros.behavior_tree.learned_tree",
+    "Policy": "rebt_ros.policy",
     "RebtError": "rebt_ros.errors",
     "Root": "rebt_ros.behavior_tree.learned_tree",
     "Upsampling": "rebt_ros.decision_tree.upsampling",

@@ -1,13 +1,18 @@
-"""Choosing what to learn: the pruning level, LAT, and PSA nodes.
+"""Choosing what to learn: the pruning level, what a tree may test beside the features, PSA nodes.
 
-All is decided by own-history agreement in cross-validation: how often a tree does what the
-demonstrator did, on rows that it was not learned from, when LAT is what it chose itself before.
+All is decided in cross-validation, on rows that a tree was not learned from:
+
+- whether the tree may test the previous action, by the mean recall of unpruned trees after their
+  own choices;
+- whether it may test differences of features, by agreement and size;
+- the pruning level, by mean recall (see `selection`);
+- PSA nodes, by own-history agreement.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -18,21 +23,31 @@ from rebt_ros.algorithms.re_bt_espresso import re_bt_espresso
 from rebt_ros.algorithms.rules import delta_close, leaf_rules
 from rebt_ros.arrays import IntArray
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.decision_tree.differences import likely_differences
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Difference
 from rebt_ros.options import LearnOptions, Use
 from rebt_ros.selection import MOST_FOLDS, CrossValidation, JudgedLevels
 
-#: With fewer rows the folds are too small to tell levels apart.
-_FEWEST_ROWS = 50
+#: With fewer rows the folds are too small to tell anything.
+_FEWEST_ROWS = 20
 
-#: Steps of two cross-validations, of running the trees of one, and of running them with PSA nodes
+#: Rows by whole demonstrations that tell what a tree may test; the level is chosen by all.
+_ROWS_THAT_TELL = 6_000
+
+#: How much agreement differences may cost, and to which share of the leaves they have to come.
+_DEARER, _SMALLER = 0.005, 0.75
+
+#: Steps of four cross-validations, of running the trees of two, and of running them with PSA nodes
 #: and without.
-_MOST_STEPS = 2 * (MOST_FOLDS + 1) + MOST_FOLDS + 2 * MOST_FOLDS
+_MOST_STEPS = 4 * (MOST_FOLDS + 1) + 2 * MOST_FOLDS + 2 * MOST_FOLDS
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Policy:
+class ChosenPolicy:
     """What was chosen, and why."""
 
     fitted: FittedTree
@@ -43,8 +58,6 @@ class Policy:
     """The pruning levels that were chosen from; None where there was no choice."""
     reasons: tuple[str, ...]
     """A sentence for each choice."""
-    with_last_action: FittedTree | None = None
-    """The tree of all rows that may test LAT, if there is one; `fitted` is it, or is preferred."""
 
 
 class _Steps:
@@ -56,14 +69,14 @@ class _Steps:
 
     def __call__(self) -> None:
         self._taken += 1
-        self._advance(self._taken / _MOST_STEPS)
+        self._advance(min(self._taken / _MOST_STEPS, 1.0))
 
 
 def choose(
     table: DemonstrationTable,
     options: LearnOptions,
     advance: Callable[[float], None] = lambda share: None,
-) -> Policy:
+) -> ChosenPolicy:
     """Chooses a policy.
 
     Args:
@@ -73,18 +86,20 @@ def choose(
     """
     if len(table) < _FEWEST_ROWS:
         return _unjudged(table, options)
-    judged, level, reasons, with_lat = _last_action_and_level(table, options, _Steps(advance))
-    ccp_alpha = options.ccp_alpha
+    choice = _Choice(table, options, _Steps(advance))
+    vocabulary = choice.vocabulary()
+    judged = choice.judged(vocabulary)
+    levels = judged.levels(partial(own_history_choices, options=options, psa=False))
+    ccp_alpha, reasons = options.ccp_alpha, choice.reasons
     if ccp_alpha is None:
-        ccp_alpha = float(level.ccp_alphas[level.chosen])
+        ccp_alpha = float(levels.ccp_alphas[levels.best])
         reasons.append(
-            f"Of {len(level.ccp_alphas)} pruning levels, ccp_alpha = {ccp_alpha:.3g} makes the "
-            f"smallest tree whose agreement ({level.means[level.chosen]:.1%}) is within one "
-            f"standard error ({level.standard_errors[level.best]:.1%}) of the best "
-            f"({level.means[level.best]:.1%})."
+            f"Of {len(levels.ccp_alphas)} pruning levels, ccp_alpha = {ccp_alpha:.3g} has the best "
+            f"mean recall ({levels.mean_recalls[levels.best]:.1%}, "
+            f"{levels.mean_recalls[0]:.1%} unpruned)."
         )
     psa, reason = _choose_psa(judged, ccp_alpha, options)
-    return Policy(judged.fitted, ccp_alpha, psa, level, (*reasons, reason), with_lat)
+    return ChosenPolicy(judged.fitted, ccp_alpha, psa, levels, (*reasons, reason))
 
 
 def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.Node:
@@ -106,15 +121,16 @@ def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.
 def own_history_choices(
     trained: TrainedTree, table: DemonstrationTable, options: LearnOptions, *, psa: bool
 ) -> IntArray:
-    """What the behavior tree of a decision tree chooses, LAT being what it chose before.
+    """What the behavior tree of a decision tree chooses after its own choices.
 
-    Without LAT there is no need for the behavior tree, whose minimization takes long: it chooses
+    It need not be made, which takes long, unless LAT or PSA nodes come with a history: it chooses
     what the leaf of the decision tree does, or the best supported one of the leaf's PSA group.
     """
-    if trained.uses_last_action:
+    history = trained.vocabulary.history
+    if history is History.LAST or (psa and history is not History.NONE):
         return evaluation.own_history_choices(convert(trained, options, psa=psa), table)
     if not psa:
-        return trained.predict(table)
+        return evaluation.decision_tree_choices(trained, table)
     rules = leaf_rules(trained.tree, lambda leaf: delta_close(leaf, options.delta))
     place = {action: position for position, action in enumerate(trained.tree.actions)}
     first = {
@@ -125,58 +141,101 @@ def own_history_choices(
     return np.array(chosen, dtype=np.int64)[of_row]
 
 
-def _unjudged(table: DemonstrationTable, options: LearnOptions) -> Policy:
-    """Without cross-validation: no pruning, LAT and PSA only where they are asked for."""
+def _unjudged(table: DemonstrationTable, options: LearnOptions) -> ChosenPolicy:
+    """Without cross-validation: no pruning, history and PSA only where they are asked for."""
     fitted = fit(
         table,
-        last_action=options.last_action is Use.ALWAYS,
+        vocabulary=Vocabulary(options.history or History.NONE),
         max_depth=options.max_depth,
         random_state=options.random_state,
         upsample=options.upsample,
     )
     reason = f"{len(table)} rows are too few to choose by: the tree is not pruned."
     ccp_alpha = options.ccp_alpha or 0.0
-    return Policy(fitted, ccp_alpha, options.psa is Use.ALWAYS, None, (reason,))
+    return ChosenPolicy(fitted, ccp_alpha, options.psa is Use.ALWAYS, None, (reason,))
 
 
-def _last_action_and_level(
-    table: DemonstrationTable, options: LearnOptions, step: Callable[[], None]
-) -> tuple[CrossValidation, JudgedLevels, list[str], FittedTree | None]:
-    def cross_validation(last_action: bool) -> CrossValidation:
-        return CrossValidation(
-            table,
-            last_action=last_action,
-            max_depth=options.max_depth,
-            random_state=options.random_state,
-            upsample=options.upsample,
-            step=step,
+class _Choice:
+    """Cross-validations of one table, each made once."""
+
+    def __init__(
+        self, table: DemonstrationTable, options: LearnOptions, step: Callable[[], None]
+    ) -> None:
+        self._table, self._options, self._step = table, options, step
+        self._telling = _telling(table)
+        self._made: dict[tuple[bool, Vocabulary], CrossValidation] = {}
+        self.reasons: list[str] = []
+
+    def judged(self, vocabulary: Vocabulary, *, telling: bool = False) -> CrossValidation:
+        """Of all rows, or of those that tell what a tree may test."""
+        telling = telling and len(self._telling) < len(self._table)
+        key = telling, vocabulary
+        if key not in self._made:
+            options = self._options
+            self._made[key] = CrossValidation(
+                self._telling if telling else self._table,
+                vocabulary=vocabulary,
+                max_depth=options.max_depth,
+                random_state=options.random_state,
+                upsample=options.upsample,
+                step=self._step,
+            )
+        return self._made[key]
+
+    def vocabulary(self) -> Vocabulary:
+        """What the tree may test beside the features."""
+        vocabulary = Vocabulary(self._history())
+        return replace(vocabulary, differences=self._differences(vocabulary))
+
+    def _history(self) -> History:
+        asked = self._options.history
+        if asked is not None:
+            return asked
+        without = self.judged(FEATURES_ALONE, telling=True).unpruned_recall()
+        with_it = self.judged(Vocabulary(History.PREVIOUS), telling=True).unpruned_recall()
+        compared = f"mean recall ({with_it:.1%} after its own choices, {without:.1%} without)"
+        if with_it > without:
+            self.reasons.append(f"Testing the previous action raises {compared}.")
+            return History.PREVIOUS
+        self.reasons.append(f"Testing the previous action does not raise {compared}.")
+        return History.NONE
+
+    def _differences(self, vocabulary: Vocabulary) -> tuple[Difference, ...]:
+        options = self._options
+        if options.differences is Use.NEVER:
+            return ()
+        differences = likely_differences(self._telling, vocabulary, options.random_state)
+        if options.differences is Use.ALWAYS or not differences:
+            return differences
+        choices = partial(own_history_choices, options=options, psa=False)
+        without = self.judged(vocabulary, telling=True)
+        with_them = self.judged(replace(vocabulary, differences=differences), telling=True)
+        before, after = without.levels(choices), with_them.levels(choices)
+        leaves = [
+            int(judged.fitted.path.leaf_counts()[levels.best])
+            for judged, levels in ((without, before), (with_them, after))
+        ]
+        agreements = [float(levels.means[levels.best]) for levels in (before, after)]
+        compared = (
+            f"{leaves[1]} instead of {leaves[0]} leaves, agreement {agreements[1]:.1%} instead of "
+            f"{agreements[0]:.1%}"
         )
+        if agreements[1] >= agreements[0] - _DEARER and leaves[1] <= _SMALLER * leaves[0]:
+            self.reasons.append(f"Differences of features make a smaller tree ({compared}).")
+            return differences
+        self.reasons.append(f"Differences of features make no better tree ({compared}).")
+        return ()
 
-    def run(judged: CrossValidation) -> JudgedLevels:
-        return judged.own_history(partial(own_history_choices, options=options, psa=False))
 
-    if options.last_action is Use.ALWAYS:
-        with_lat = cross_validation(last_action=True)
-        return with_lat, run(with_lat), [], with_lat.fitted
-    without = cross_validation(last_action=False)
-    plain = run(without)
-    if options.last_action is Use.NEVER:
-        return without, plain, [], None
-    with_lat = cross_validation(last_action=True)
-    forced = with_lat.teacher_forced().means.max()
-    if forced <= plain.means[plain.best]:
-        # Its own history cannot be expected to do better than the demonstrator's.
-        reason = f"{forced:.1%} even with the demonstrator's own"
-        own = None
-    else:
-        own = run(with_lat)
-        reason = f"{own.means[own.best]:.1%} with its own history"
-    compared = f"({reason}, {plain.means[plain.best]:.1%} without)"
-    if own is None or own.means[own.best] <= plain.means[plain.best]:
-        reasons = [f"The last action taken does not raise agreement {compared}."]
-        return without, plain, reasons, with_lat.fitted
-    reasons = [f"Testing the last action taken raises agreement {compared}."]
-    return with_lat, own, reasons, with_lat.fitted
+def _telling(table: DemonstrationTable) -> DemonstrationTable:
+    """Whole demonstrations, evenly spread, or the first rows of the only one."""
+    if len(table) <= _ROWS_THAT_TELL:
+        return table
+    shown, position = np.unique(table.demonstration, return_inverse=True)
+    if len(shown) == 1:
+        return table.where(np.arange(len(table)) < _ROWS_THAT_TELL)
+    kept = max(2, len(shown) * _ROWS_THAT_TELL // len(table))
+    return table.where(np.isin(position, np.arange(kept) * len(shown) // kept))
 
 
 def _choose_psa(

@@ -3,15 +3,17 @@
 fidelity
     It chooses what its decision tree predicts.
 agreement, teacher-forced
-    It chooses what the demonstrator did, LAT being the demonstration's column.  That column knows
-    the action of its own row, from which it differs, so the figure flatters trees that test LAT.
+    It chooses what the demonstrator did, after what the demonstrator did before.  The column of
+    LAT knows the action of its own row, from which it differs, so the figure flatters trees that
+    test LAT.
 agreement, own-history
-    It chooses what the demonstrator did, LAT being what the tree chose itself in earlier rows:
-    what to expect of the executed tree.
+    It chooses what the demonstrator did, after what the tree chose itself in earlier rows: what
+    to expect of the executed tree.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -21,13 +23,14 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import (
     Plan,
     States,
+    as_it_stands,
     choose,
-    last_action_column,
-    last_action_of,
+    history_columns,
 )
-from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
+from rebt_ros.decision_tree.training import TrainedTree
+from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import LastActionIs, Literal
+from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
 
 #: Conditions that are told apart by one number each; with more, the kinds are counted anew.
 _MOST_BITS = 30
@@ -39,13 +42,13 @@ def actions_of(table: DemonstrationTable) -> tuple[nodes.Action, ...]:
 
 
 def teacher_forced_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
-    """What the tree chooses in each row when LAT is the table's column, as for a decision tree.
+    """What the tree chooses in each row after what is in the table, as for a decision tree.
 
     Returns:
         Positions in ``table.actions``, `NO_ACTION` where it chooses none, shape (rows,).
     """
-    column = last_action_column(table.actions, table.last)
-    return choose(tree, actions_of(table), States(table.features, table.states, column))
+    columns = history_columns(table.actions, table.previous, table.last)
+    return choose(tree, actions_of(table), States(table.features, table.states, columns))
 
 
 def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
@@ -56,27 +59,57 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
     situations, of_row = _situations(tree, table)
     plan, actions = Plan(tree, table.features), actions_of(table)
     # Each history that comes up is evaluated once: there are far fewer than rows.
-    choices: dict[tuple[str, ...], list[int]] = {}
+    choices: dict[tuple[str | None, tuple[str, ...]], list[int]] = {}
 
-    def after(recent: tuple[str, ...]) -> list[int]:
-        if recent not in choices:
-            history = last_action_of(ActionHistory(reversed(recent)))
-            states = States(situations.features, situations.states, history)
-            choices[recent] = plan.choose(actions, states).tolist()
-        return choices[recent]
+    def after(previous: str | None, recent: tuple[str, ...]) -> list[int]:
+        if (previous, recent) not in choices:
+            history = ActionHistory(reversed(recent))
+            history.previous = previous
+            states = States(situations.features, situations.states, as_it_stands(history))
+            choices[previous, recent] = plan.choose(actions, states).tolist()
+        return choices[previous, recent]
 
     chosen: list[int] = []
     for start, end in pairwise((*np.flatnonzero(_starts(table)).tolist(), len(table))):
         recent = _recent_at(start, table)
-        chooses, newest = after(recent), NO_ACTION
+        chooses, newest = after(_label(table, table.previous[start]), recent), NO_ACTION
         for situation in of_row[start:end].tolist():
             choice = chooses[situation]
             chosen.append(choice)
             # What was done just now is the first in the history already.
             if choice not in (newest, NO_ACTION):
                 newest = choice
-                recent = _after(recent, table.actions[choice], reach)
-                chooses = after(recent)
+                label = table.actions[choice]
+                recent = _after(recent, label, reach)
+                chooses = after(label, recent)
+    return np.array(chosen, dtype=np.int64)
+
+
+def decision_tree_choices(trained: TrainedTree, table: DemonstrationTable) -> IntArray:
+    """What a decision tree chooses in each row after its own choices in the rows before it.
+
+    The behavior tree of a decision tree that does not test LAT chooses the same, and takes longer
+    to be made.
+    """
+    match trained.vocabulary.history:
+        case History.NONE:
+            return trained.predict(table)
+        case History.LAST:
+            raise ValueError("LAT depends on the rule that asks, which a decision tree has none of")
+    # What is chosen after each action, and in the last line after none.
+    befores = [*range(len(table.actions)), NO_ACTION]
+    choices = [
+        trained.predict(replace(table, previous=np.full(len(table), before))).tolist()
+        for before in befores
+    ]
+    chosen: list[int] = []
+    starts = _starts(table)
+    choice = NO_ACTION
+    for row, (starting, before) in enumerate(
+        zip(starts.tolist(), table.previous.tolist(), strict=True)
+    ):
+        choice = choices[before if starting else choice][row]
+        chosen.append(choice)
     return np.array(chosen, dtype=np.int64)
 
 
@@ -86,12 +119,12 @@ def agreement(chosen: IntArray, table: DemonstrationTable) -> float | None:
 
 
 def _situations(tree: nodes.Node, table: DemonstrationTable) -> tuple[DemonstrationTable, IntArray]:
-    """A row of each kind that the tree can tell apart but for LAT, and the kind of each row."""
+    """A row of each kind that the state alone tells apart, and the kind of each row."""
     states = States(table.features, table.states, lambda condition: False)
     tested = dict.fromkeys(
         one.literal.condition
         for one in nodes.conditions(tree)
-        if not isinstance(one.literal.condition, LastActionIs)
+        if not isinstance(one.literal.condition, PreviousActionIs | LastActionIs)
     )
     kind = np.zeros(len(table), dtype=np.int64)
     for place, condition in enumerate(tested, start=1):
@@ -108,8 +141,13 @@ def _situations(tree: nodes.Node, table: DemonstrationTable) -> tuple[Demonstrat
 
 def _recent_at(row: int, table: DemonstrationTable) -> tuple[str, ...]:
     """What is known to have been done before the first row of a demonstration."""
-    code = NO_ACTION if table.before is None else int(table.before[table.demonstration[row]])
-    return () if code == NO_ACTION else (table.actions[code],)
+    code = NO_ACTION if table.before is None else table.before[table.demonstration[row]]
+    label = _label(table, code)
+    return () if label is None else (label,)
+
+
+def _label(table: DemonstrationTable, code: int) -> str | None:
+    return None if code == NO_ACTION else table.actions[code]
 
 
 def _after(recent: tuple[str, ...], action: str, reach: int) -> tuple[str, ...]:
@@ -118,11 +156,15 @@ def _after(recent: tuple[str, ...], action: str, reach: int) -> tuple[str, ...]:
 
 
 def _reach(tree: nodes.Node) -> int:
-    """How many distinct recent actions the tree's LAT conditions can look back over."""
-    conditions = [one.literal.condition for one in nodes.conditions(tree)]
-    return max(
-        (len(one.deciding) + 1 for one in conditions if isinstance(one, LastActionIs)), default=0
-    )
+    """How many distinct recent actions the tree's conditions can look back over."""
+    reach = 0
+    for one in nodes.conditions(tree):
+        match one.literal.condition:
+            case PreviousActionIs():
+                reach = max(reach, 1)
+            case LastActionIs(deciding=deciding):
+                reach = max(reach, len(deciding) + 1)
+    return reach
 
 
 def _starts(table: DemonstrationTable) -> BoolArray:

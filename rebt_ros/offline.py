@@ -200,7 +200,9 @@ def summarize(result: OfflineLearning) -> dict[str, Any]:
         "held_out_rows": figures.held_out_rows,
         "teacher_forced_agreement": figures.teacher_forced_agreement,
         "own_history_agreement": figures.own_history_agreement,
-        "uses_last_action": provenance.uses_last_action,
+        "mean_recall": figures.mean_recall,
+        "history": provenance.history.value,
+        "row_kind": learned.row_kind.value,
         "root": provenance.root.value,
         "delta": provenance.delta,
         "max_depth": provenance.max_depth,
@@ -245,6 +247,7 @@ def _choices(learning: Learning) -> dict[str, Any]:
     return {
         "decision_tree_leaves": learning.decision_tree.tree.leaves,
         "psa": learning.policy.psa,
+        "report": learning.report.as_json(),
         "reasons": list(learning.policy.reasons),
         "levels": list(_levels(learning.policy.levels)),
     }
@@ -253,9 +256,14 @@ def _choices(learning: Learning) -> dict[str, Any]:
 def _levels(levels: JudgedLevels | None) -> Iterator[dict[str, float]]:
     """The pruning levels that were chosen from, with their agreement in cross-validation."""
     if levels is not None:
-        columns = (levels.ccp_alphas, levels.means, levels.standard_errors)
-        for alpha, mean, error in zip(*(column.tolist() for column in columns), strict=True):
-            yield {"ccp_alpha": alpha, "own_history_agreement": mean, "standard_error": error}
+        columns = (levels.ccp_alphas, levels.mean_recalls, levels.means, levels.standard_errors)
+        for alpha, recall, mean, error in zip(*(one.tolist() for one in columns), strict=True):
+            yield {
+                "ccp_alpha": alpha,
+                "mean_recall": recall,
+                "agreement": mean,
+                "standard_error": error,
+            }
 
 
 def _versions(options: LearnOptions) -> dict[str, str]:

@@ -10,15 +10,19 @@ from rebt_ros.algorithms.priority_root import ALL_REDUCTIONS, Reductions
 from rebt_ros.algorithms.suggestions import PsaChoice
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import LARGEST_LAG
 from rebt_ros.errors import OptionError
+
+#: No one reacts later than that (seconds).
+_LATEST = 5.0
 
 
 class Use(Enum):
     """Whether the executed tree has something."""
 
     AUTO = "auto"
-    """Only if that raises own-history agreement on rows that it was not learned from."""
+    """Only where cross-validation speaks for it (see `choosing`)."""
     ALWAYS = "always"
     NEVER = "never"
 
@@ -35,8 +39,11 @@ class LearnOptions:
     """Threshold δ in [0, 1] of actions that are close enough to stand in one PSA node."""
     psa: Use = Use.AUTO
     """Whether PSA nodes stand in the executed tree."""
-    last_action: Use = Use.AUTO
-    """Whether the executed tree may test LAT."""
+    history: History | None = None
+    """What the executed tree may test of what was done before; None to choose between the previous
+    action and nothing by cross-validation (paper: LAT)."""
+    differences: Use = Use.AUTO
+    """Whether the executed tree may test the difference of two features."""
     max_depth: int | None = None
     """Splits on the decision tree's longest path; None to grow it fully, which leaves its size to
     pruning (paper: 5)."""
@@ -48,8 +55,14 @@ class LearnOptions:
     """Reductions past the paper; None for Algorithm 1 as printed."""
     test_fraction: float = 0.25
     """Share of the rows, or of the demonstrations if several, that is held out; in [0, 1)."""
-    refit: bool = False
+    refit: bool = True
     """Whether the tree is learned from all rows in the end, once it has been judged."""
+    readable_thresholds: bool = True
+    """Whether thresholds are moved to round values that splits share, within the gaps between the
+    rows that were shown."""
+    reaction_time: float | None = None
+    """How late the demonstrator acted (seconds), to be undone before learning; None to read it off
+    the demonstrations if their rows are samples, and otherwise 0."""
     random_state: int = 0
     """Decides between equally good splits, and which rows are made up."""
     lags: int = 0
@@ -74,6 +87,11 @@ class LearnOptions:
             raise OptionError(
                 f"test_fraction must be at least 0 and less than 1, not {self.test_fraction:g}."
             )
+        if self.reaction_time is not None and not 0 <= self.reaction_time <= _LATEST:
+            raise OptionError(
+                f"reaction_time must lie between 0 and {_LATEST:g} seconds, not at "
+                f"{self.reaction_time:g}."
+            )
         if not 0 <= self.random_state < 2**32:
             raise OptionError(f"random_state must be a 32-bit number, not {self.random_state}.")
         if not 0 <= self.lags <= LARGEST_LAG:
@@ -90,11 +108,15 @@ class LearnOptions:
         return cls(
             delta=0.3,
             psa=Use.ALWAYS,
-            last_action=Use.ALWAYS,
+            history=History.LAST,
+            differences=Use.NEVER,
             max_depth=5,
             ccp_alpha=0.0,
             root=Root.PARALLEL,
             reductions=None,
+            refit=False,
+            readable_thresholds=False,
+            reaction_time=0.0,
             routines=False,
         )
 

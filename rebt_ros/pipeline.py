@@ -18,15 +18,19 @@ from rebt_ros.behavior_tree.learned_tree import (
     LearnedTree,
     Provenance,
 )
-from rebt_ros.choosing import Policy, choose, convert
+from rebt_ros.choosing import ChosenPolicy, choose, convert, own_history_choices
 from rebt_ros.decision_tree.shown_rows import shown_rows
-from rebt_ros.decision_tree.training import TrainedTree, train
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.lags import evenly_spaced, with_lags
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.options import DEFAULTS, LearnOptions
+from rebt_ros.report import LearningReport, report_on
+from rebt_ros.selection import mean_recall
 from rebt_ros.suggesting import accept, routines_of, suggest
 
 
@@ -39,8 +43,12 @@ class Learning:
     table: DemonstrationTable
     held_out: BoolArray
     """Rows that the tree was judged on, shape (rows,)."""
-    policy: Policy
+    policy: ChosenPolicy
     """What was chosen to learn, and why."""
+    judge: FittedTree
+    """Fitted to the rows that were not held out: what figures come from."""
+    report: LearningReport
+    """What a person must know about it."""
     notes: tuple[str, ...] = ()
     """What a person should know about it; no full stops."""
 
@@ -57,6 +65,9 @@ _VERY_LARGE = (
     "the decision tree of channel {!r} has {} leaves, too many for its rules to be minimized and "
     "put in their best order: they keep its conditions; prune more for a smaller tree"
 )
+
+#: Up to so many rows, what is learned from all of them is chosen from all of them as well.
+_CHOSEN_FROM_ALL = 5_000
 
 #: Where of all the work choosing and judging begin.
 _CHOOSING, _JUDGING = 0.1, 0.8
@@ -126,7 +137,7 @@ def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
             learning.table.channel,
             one.provenance.rows,
             one.provenance.ccp_alpha,
-            one.provenance.uses_last_action,
+            one.provenance.history,
             one.provenance.figures,
         )
         for learning, one in zip(learnings, trees, strict=True)
@@ -140,7 +151,9 @@ def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
             demonstrations=max(one.provenance.demonstrations for one in trees),
             rows=sum(one.rows for one in channels),
             ccp_alpha=max(one.ccp_alpha for one in channels),
-            uses_last_action=any(one.uses_last_action for one in channels),
+            history=next(
+                (one.history for one in channels if one.history is not History.NONE), History.NONE
+            ),
             figures=_pooled([one.figures for one in channels]),
             channels=channels,
         ),
@@ -170,6 +183,7 @@ def _pooled(figures: Sequence[Figures]) -> Figures:
         share([one.teacher_forced_agreement for one in figures]),
         share([one.own_history_agreement for one in figures]),
         rows,
+        share([one.mean_recall for one in figures]),
     )
 
 
@@ -202,28 +216,24 @@ def learn_from(
         lambda share: progress("choosing", _CHOOSING + (_JUDGING - _CHOOSING) * share),
     )
     progress("judging", _JUDGING)
-    trained = policy.fitted.at(policy.ccp_alpha)
-    tree = convert(trained, options, psa=policy.psa)
-    figures = figures_of(table, held_out, trained, tree)
+    judge = policy.fitted
+    figures = figures_of(table.where(held_out), judge.at(policy.ccp_alpha), options, policy.psa)
+    learned_from = shown
     if options.refit and held_out.any():
-        progress("refitting", 0.9)
-        trained = _refit(table, options, policy)
-        tree = convert(trained, options, psa=policy.psa)
-        figures = replace(figures, fidelity_mismatches=_mismatches(table, trained, tree))
-    learned_from = table if options.refit else shown
+        progress("learning from all rows", _JUDGING)
+        learned_from = table
+        policy = _from_all(table, options, policy)
+    trained = pruned(policy.fitted, policy.ccp_alpha, learned_from, options)
+    whole = convert(trained, options, psa=policy.psa)
     progress("suggesting", 0.9)
     routines = routines_of(learned_from, options)
-    suggestions, notes = suggest(
-        learned_from,
-        trained,
-        policy.ccp_alpha,
-        options,
-        routines,
-        fitted=None if options.refit else policy.with_last_action,
-    )
-    tree, suggestions = accept(tree, suggestions, options)
-    learned = as_learned(table, trained, tree, policy.ccp_alpha, figures, options)
+    suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options, routines)
+    tree, suggestions = accept(whole, suggestions, options)
+    figures = replace(figures, fidelity_mismatches=mismatches(table, trained, whole))
+    learned = as_learned(learned_from, trained, tree, policy.ccp_alpha, figures, options)
     ranges = shown_rows(learned_from, trained)
+    history = trained.vocabulary.history
+    report = report_on(learned_from, tree, history, policy.levels, policy.ccp_alpha)
     progress("done", 1.0)
     return Learning(
         replace(learned, suggestions=suggestions, shown=(ranges,)),
@@ -231,8 +241,45 @@ def learn_from(
         table,
         held_out,
         policy,
-        (*trained.notes, *notes, *_cautions(table, trained, options)),
+        judge,
+        report,
+        (*report.notes(), *trained.notes, *notes, *_cautions(table, trained, options)),
     )
+
+
+def _from_all(
+    table: DemonstrationTable, options: LearnOptions, policy: ChosenPolicy
+) -> ChosenPolicy:
+    """A policy of all rows, as chosen from them; of many rows, as chosen from those not held out.
+
+    Of few rows each one counts, also for what is chosen.
+    """
+    if len(table) <= _CHOSEN_FROM_ALL:
+        return choose(table, options)
+    fitted = fit(
+        table,
+        vocabulary=policy.fitted.vocabulary,
+        max_depth=options.max_depth,
+        random_state=options.random_state,
+        upsample=options.upsample,
+    )
+    return replace(policy, fitted=fitted)
+
+
+def pruned(
+    fitted: FittedTree, ccp_alpha: float, table: DemonstrationTable, options: LearnOptions
+) -> TrainedTree:
+    """The decision tree of a pruning level, with thresholds as the options say.
+
+    Args:
+        fitted: The tree.
+        ccp_alpha: The level.
+        table: What it was fitted to.
+        options: How to learn.
+    """
+    if options.readable_thresholds and options.upsample is Upsampling.NONE:
+        return fitted.readable_at(ccp_alpha, table)
+    return fitted.at(ccp_alpha)
 
 
 def _cautions(
@@ -251,15 +298,27 @@ def _cautions(
 
 
 def figures_of(
-    table: DemonstrationTable, held_out: BoolArray, trained: TrainedTree, tree: nodes.Node
+    rows: DemonstrationTable, trained: TrainedTree, options: LearnOptions, psa: bool
 ) -> Figures:
-    """How well a behavior tree does on the rows held out, and like its decision tree on all."""
-    rows = table.where(held_out)
+    """How well the behavior tree of a decision tree does on rows that it was not learned from.
+
+    Of fidelity nothing is said: that is about the tree that is published (see `mismatches`).
+    """
+    if not len(rows):
+        return Figures(0, None, None, 0)
+    forced = trained.predict(rows)
+    if psa or trained.vocabulary.history is History.LAST:
+        tree = convert(trained, options, psa=psa)
+        forced = evaluation.teacher_forced_choices(tree, rows)
+    own = own_history_choices(trained, rows, options, psa=psa)
+    shown = np.bincount(rows.chosen, minlength=len(rows.actions))
+    hits = np.bincount(rows.chosen[own == rows.chosen], minlength=len(rows.actions))
     return Figures(
-        _mismatches(table, trained, tree),
-        evaluation.agreement(evaluation.teacher_forced_choices(tree, rows), rows),
-        evaluation.agreement(evaluation.own_history_choices(tree, rows), rows),
-        int(held_out.sum()),
+        0,
+        evaluation.agreement(forced, rows),
+        evaluation.agreement(own, rows),
+        len(rows),
+        float(mean_recall(hits, shown)),
     )
 
 
@@ -283,26 +342,17 @@ def as_learned(
             max_depth=options.max_depth,
             ccp_alpha=ccp_alpha,
             root=options.root,
-            uses_last_action=trained.uses_last_action,
+            history=trained.vocabulary.history,
             figures=figures,
         ),
+        row_kind=table.row_kind,
     )
 
 
-def _mismatches(table: DemonstrationTable, trained: TrainedTree, tree: nodes.Node) -> int:
+def mismatches(table: DemonstrationTable, trained: TrainedTree, tree: nodes.Node) -> int:
+    """Rows on which a behavior tree chooses something else than its decision tree."""
     chosen = evaluation.teacher_forced_choices(tree, table)
     return int(np.sum(chosen != trained.predict(table)))
-
-
-def _refit(table: DemonstrationTable, options: LearnOptions, policy: Policy) -> TrainedTree:
-    return train(
-        table,
-        last_action=policy.fitted.uses_last_action,
-        max_depth=options.max_depth,
-        ccp_alpha=policy.ccp_alpha,
-        random_state=options.random_state,
-        upsample=options.upsample,
-    )
 
 
 def summary_sentence(learned: LearnedTree) -> str:
@@ -310,12 +360,13 @@ def summary_sentence(learned: LearnedTree) -> str:
     provenance = learned.provenance
     figures = provenance.figures
     shown = provenance.demonstrations
-    judged = (
-        "not judged, as no rows were held out"
-        if figures.own_history_agreement is None
-        else f"it agrees with {figures.own_history_agreement:.1%} of {figures.held_out_rows} "
-        "held-out rows"
-    )
+    judged = "it is not judged, as no rows were held out"
+    if figures.own_history_agreement is not None:
+        # Rows that it was judged on may have been learned from afterwards.
+        judged = (
+            f"learned without them, it agrees with {figures.own_history_agreement:.1%} of "
+            f"{figures.held_out_rows} held-out rows"
+        )
     return (
         f"Learned a behavior tree with {nodes.size(learned.tree)} nodes and "
         f"{len(nodes.actions(learned.tree))} actions from {provenance.rows} rows of "

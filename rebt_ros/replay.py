@@ -17,7 +17,6 @@ from rebt_ros.demonstration.last_action import NO_ACTION
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, category, tabulate
 from rebt_ros.errors import InputError
-from rebt_ros.logic.conditions import LastActionIs
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,11 +120,7 @@ def _as_the_tree_reads(
     learned: LearnedTree, channel: str, policy: nodes.Node, table: DemonstrationTable
 ) -> DemonstrationTable:
     """The rows with the tree's features and channel, and with all of its actions known."""
-    tested = {
-        one.literal.condition.feature
-        for one in nodes.conditions(policy)
-        if not isinstance(one.literal.condition, LastActionIs)
-    }
+    tested = nodes.features(policy)
     recorded = {feature.name: place for place, feature in enumerate(table.features)}
     missing = sorted(tested - set(recorded))
     if missing:

@@ -1,8 +1,14 @@
-"""Choosing a pruning level by cross-validation and the one-standard-error rule.
+"""Choosing a pruning level by cross-validation.
 
-A level is judged by its agreement with rows that it was not learned from.  Of all levels within
-one standard error of the best one, the smallest tree is chosen (Breiman et al., 1984): where the
-folds cannot tell trees apart, the one that is easiest to read is the best.
+recall
+    Of an action: the share of its rows on which a tree takes it, of the rows that it was not
+    learned from.
+
+A level is judged by its mean recall over all actions, so that an action that is rare but decisive
+counts as much as a frequent one.  The best level is chosen, and of equals the one with the larger
+tree: rows that decide a task are few, and pruning them away costs the task.  A rule of one
+standard error, as is usual, would prune them: between folds it measures how much demonstrations
+differ.
 """
 
 from __future__ import annotations
@@ -13,13 +19,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit_parts
 from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.evaluation import decision_tree_choices
 
 MOST_FOLDS = 5
-#: A LAT-augmented tree has to be converted and run through the rows to be judged: so many levels
-#: are, and no larger trees than that, which nobody could read anyway.
+#: Folds of large tables, each of which has rows enough.
+_FEW_FOLDS, _MANY_ROWS = 3, 8_000
+#: A tree that may test LAT has to be converted and run through the rows to be judged: so many
+#: levels are, and no larger trees than that, which nobody could read anyway.
 _MOST_LEVELS_RUN, _MOST_LEAVES_RUN = 12, 32
 
 #: What the behavior tree of a pruned decision tree chooses in the rows of a table after its own
@@ -29,12 +40,16 @@ Choices = Callable[[TrainedTree, DemonstrationTable], IntArray]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JudgedLevels:
-    """Pruning levels with their agreement in each fold."""
+    """Pruning levels with how well the folds' trees do on the rows they were not learned from."""
 
     ccp_alphas: FloatArray
     """Ascending, shape (levels,): larger means a smaller tree."""
     scores: FloatArray
     """Agreement with the rows of each fold, shape (folds, levels)."""
+    hits: IntArray
+    """Rows of each action, over all folds, on which a level takes it, shape (levels, actions)."""
+    shown: IntArray
+    """Rows of each action, over all folds, shape (actions,)."""
 
     @property
     def means(self) -> FloatArray:
@@ -43,26 +58,37 @@ class JudgedLevels:
 
     @property
     def standard_errors(self) -> FloatArray:
-        """Standard error of each mean, shape (levels,)."""
+        """Standard error of each mean agreement, shape (levels,)."""
         folds = len(self.scores)
         if folds < 2:
             return np.zeros(self.scores.shape[1])
         return np.asarray(np.std(self.scores, axis=0, ddof=1) / np.sqrt(folds))
 
     @property
-    def best(self) -> int:
-        """The level with the highest mean."""
-        return int(np.argmax(self.means))
+    def mean_recalls(self) -> FloatArray:
+        """Mean recall of the actions at each level, shape (levels,)."""
+        return mean_recall(self.hits, self.shown)
+
+    def at(self, ccp_alpha: float) -> int:
+        """The level that a ``ccp_alpha`` comes to."""
+        return max(int(np.searchsorted(self.ccp_alphas, ccp_alpha, side="right")) - 1, 0)
 
     @property
-    def chosen(self) -> int:
-        """The smallest tree within one standard error of the best.
+    def best(self) -> int:
+        """The level with the highest mean recall; of equals, the one with the largest tree."""
+        # Sums of the same shares in another order may differ in the last bits.
+        return int(np.argmax(np.round(self.mean_recalls, 12)))
 
-        The last level, which takes one action whatever happens, is not chosen unless it is best.
-        """
-        enough = self.means[self.best] - self.standard_errors[self.best]
-        smallest = int(np.flatnonzero(self.means >= enough)[-1])
-        return smallest if smallest < len(self.means) - 1 else max(self.best, smallest - 1)
+
+def mean_recall(hits: IntArray, shown: IntArray) -> FloatArray:
+    """The mean over the actions that were shown of the share of their rows that was hit.
+
+    Args:
+        hits: Rows, shape (..., actions).
+        shown: Of so many, shape (actions,).
+    """
+    occurring = shown > 0
+    return np.asarray(np.mean(hits[..., occurring] / shown[occurring], axis=-1))
 
 
 class CrossValidation:
@@ -73,7 +99,7 @@ class CrossValidation:
 
     Args:
         table: At least two rows.
-        last_action: Whether the trees may test LAT.
+        vocabulary: What the trees may test beside the features.
         max_depth: Splits on the longest path; None for no limit.
         random_state: Decides between equally good splits, and which rows are made up.
         upsample: Rows to fit the trees to beside those of the table; none is judged on them.
@@ -84,20 +110,21 @@ class CrossValidation:
         self,
         table: DemonstrationTable,
         *,
-        last_action: bool,
-        max_depth: int | None,
-        random_state: int,
+        vocabulary: Vocabulary = FEATURES_ALONE,
+        max_depth: int | None = None,
+        random_state: int = 0,
         upsample: Upsampling = Upsampling.NONE,
         step: Callable[[], None] = lambda: None,
     ) -> None:
         self._step = step
+        self._actions = len(table.actions)
         fold = folds(table)
         numbers = np.unique(fold)
         trees: list[FittedTree] = []
         for tree in fit_parts(
             table,
             [fold != number for number in numbers],
-            last_action=last_action,
+            vocabulary=vocabulary,
             max_depth=max_depth,
             random_state=random_state,
             upsample=upsample,
@@ -112,43 +139,63 @@ class CrossValidation:
         self._middles = _middles(self.fitted.path.alphas)
 
     def teacher_forced(self) -> JudgedLevels:
-        """All levels with their teacher-forced agreement."""
-        scores = [of_fold.agreements(rows, self._middles) for of_fold, rows in self._folds]
-        return JudgedLevels(self.fitted.path.alphas, np.array(scores))
+        """All levels after what the demonstrator did."""
+        hits = [fitted.hits(rows, self._middles) for fitted, rows in self._folds]
+        return self._judged(self.fitted.path.alphas, hits)
 
-    def own_history(self, choices: Choices) -> JudgedLevels:
-        """Levels with their own-history agreement: all, or an even selection if LAT is tested."""
-        if not self.fitted.uses_last_action:
-            # Without LAT a tree's own history makes no difference.
+    def levels(self, choices: Choices) -> JudgedLevels:
+        """The levels to choose from: all, or an even selection if LAT is tested.
+
+        What the demonstrator did before is what a previous action is taken from.  LAT knows the
+        action of its own row, so that trees which test it are judged after their own choices.
+        """
+        if self.fitted.vocabulary.history is not History.LAST:
             return self.teacher_forced()
         small = np.flatnonzero(self.fitted.path.leaf_counts() <= _MOST_LEAVES_RUN)
         even = np.linspace(0, len(small) - 1, min(len(small), _MOST_LEVELS_RUN)).astype(int)
         run = small[np.unique(even)]
-        scores = [
-            self._run(place, self._middles[run], choices) for place in range(len(self._folds))
-        ]
-        return JudgedLevels(self.fitted.path.alphas[run], np.array(scores))
+        hits = [self._run(place, self._middles[run], choices) for place in range(len(self._folds))]
+        return self._judged(self.fitted.path.alphas[run], hits)
+
+    def unpruned_recall(self) -> float:
+        """Mean recall of the folds' unpruned trees, after their own choices."""
+        unpruned = np.zeros(1)
+        hits = sum(
+            self._run(place, unpruned, decision_tree_choices) for place in range(len(self._folds))
+        )
+        return float(mean_recall(np.asarray(hits), self._shown)[0])
 
     def own_history_at(self, ccp_alpha: float, choices: Choices) -> float:
         """Mean own-history agreement of the folds' trees at one level."""
         level = np.array([ccp_alpha])
-        return float(
-            np.mean([self._run(place, level, choices) for place in range(len(self._folds))])
-        )
+        hits = [self._run(place, level, choices) for place in range(len(self._folds))]
+        return float(self._judged(level, hits).means[0])
 
-    def _run(self, fold: int, ccp_alphas: FloatArray, choices: Choices) -> list[float]:
-        """Own-history agreement of a fold's trees at some levels."""
+    @property
+    def _shown(self) -> IntArray:
+        counts = [np.bincount(rows.chosen, minlength=self._actions) for _, rows in self._folds]
+        return np.asarray(np.sum(counts, axis=0))
+
+    def _judged(self, ccp_alphas: FloatArray, hits: list[IntArray]) -> JudgedLevels:
+        scores = [
+            its.sum(axis=1) / len(rows) for its, (_, rows) in zip(hits, self._folds, strict=True)
+        ]
+        return JudgedLevels(ccp_alphas, np.array(scores), np.sum(hits, axis=0), self._shown)
+
+    def _run(self, fold: int, ccp_alphas: FloatArray, choices: Choices) -> IntArray:
+        """The hits of a fold's trees at some levels, after their own choices."""
         fitted, rows = self._folds[fold]
-        scores: dict[bytes, float] = {}
-        found: list[float] = []
+        known: dict[bytes, IntArray] = {}
+        found: list[IntArray] = []
         for ccp_alpha in ccp_alphas.tolist():
             # The levels are those of another tree, several of which can be one level of this one.
             level = fitted.path.leaves_at(ccp_alpha).tobytes()
-            if level not in scores:
-                scores[level] = float(np.mean(choices(fitted.at(ccp_alpha), rows) == rows.chosen))
-            found.append(scores[level])
+            if level not in known:
+                right = choices(fitted.at(ccp_alpha), rows) == rows.chosen
+                known[level] = np.bincount(rows.chosen[right], minlength=self._actions)
+            found.append(known[level])
         self._step()
-        return found
+        return np.array(found)
 
 
 def folds(table: DemonstrationTable) -> IntArray:
@@ -157,10 +204,11 @@ def folds(table: DemonstrationTable) -> IntArray:
     Neighbouring rows resemble each other, so that a row whose neighbours were learned from would
     tell little.
     """
+    most = MOST_FOLDS if len(table) < _MANY_ROWS else _FEW_FOLDS
     shown, position = np.unique(table.demonstration, return_inverse=True)
     if len(shown) == 1:
-        return np.arange(len(table)) * MOST_FOLDS // max(len(table), 1)
-    return position * min(MOST_FOLDS, len(shown)) // len(shown)
+        return np.arange(len(table)) * most // max(len(table), 1)
+    return position * min(most, len(shown)) // len(shown)
 
 
 def _middles(alphas: FloatArray) -> FloatArray:

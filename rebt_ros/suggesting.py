@@ -23,7 +23,9 @@ from rebt_ros.algorithms.suggestions import (
 )
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Suggestion
-from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.decision_tree.encoding import Vocabulary
+from rebt_ros.decision_tree.training import TrainedTree, fit
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.options import LearnOptions
 from rebt_ros.routines.finding import FoundRoutine, find_routines
@@ -64,7 +66,6 @@ def suggest(
     options: LearnOptions,
     routines: Sequence[FoundRoutine] = (),
     demonstrated: Demonstrated | None = None,
-    fitted: FittedTree | None = None,
 ) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
     """What to offer: PSA nodes of the tree, and what a LAT-augmented tree tells about sequences.
 
@@ -76,7 +77,6 @@ def suggest(
         routines: What `routines_of` found in the table.
         demonstrated: What `demonstrated_in` makes of the table, which saves time where several
             trees are learned from it.
-        fitted: A tree of the same rows that may test LAT, if there is one: it saves a fit.
 
     Returns:
         At most twelve suggestions, routines first, then the best supported (all of them in the
@@ -87,10 +87,10 @@ def suggest(
     if _too_large(trained, options):
         return found, (_TOO_LARGE, *_on_left_out(left_out))
     with_lat = trained
-    if not trained.uses_last_action:
-        fitted = fitted or fit(
+    if trained.vocabulary.history is not History.LAST:
+        fitted = fit(
             table,
-            last_action=True,
+            vocabulary=Vocabulary(History.LAST),
             max_depth=options.max_depth,
             random_state=options.random_state,
             upsample=options.upsample,

@@ -33,22 +33,28 @@ from rebt_ros.behavior_tree.shown import (
     ShownValues,
     Span,
 )
+from rebt_ros.demonstration.demonstration import RowKind
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import LARGEST_LAG, Feature, FeatureKind
 from rebt_ros.errors import DocumentError
 from rebt_ros.logic.conditions import (
     Condition,
+    Difference,
     HasCategory,
     Interval,
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
+    Quantity,
     Threshold,
 )
 
 FORMAT = "rebt_ros/behavior_tree"
-#: Version 1 had no ``shown``; it is read still.
-VERSION = 2
-_READ = (1, VERSION)
+#: Version 1 had no ``shown``, and version 2 did not say what a row is; both are read still.
+VERSION = 3
+#: The fields that each version has beside those of version 1.
+_ADDED: Mapping[int, tuple[str, ...]] = {1: (), 2: ("shown",), VERSION: ("shown", "row_kind")}
 
 #: Longest document that is read, in characters.
 LARGEST_DOCUMENT = 4_000_000
@@ -124,6 +130,7 @@ def _encode(learned: LearnedTree) -> Json:
     return {
         "format": FORMAT,
         "version": VERSION,
+        "row_kind": learned.row_kind.value,
         "features": [_encode_feature(feature) for feature in learned.features],
         "actions": [{"label": one.label, "channel": one.channel} for one in learned.actions],
         "tree": _encode_node(learned.tree),
@@ -165,7 +172,9 @@ def _encode_provenance(provenance: Provenance) -> Json:
         "max_depth": provenance.max_depth,
         "ccp_alpha": provenance.ccp_alpha,
         "root": provenance.root.value,
-        "uses_last_action": provenance.uses_last_action,
+        "history": provenance.history.value,
+        "late_rows": provenance.late_rows,
+        "late_seconds": provenance.late_seconds,
         "figures": _encode_figures(provenance.figures),
     }
     if provenance.channels:
@@ -174,7 +183,7 @@ def _encode_provenance(provenance: Provenance) -> Json:
                 "channel": one.channel,
                 "rows": one.rows,
                 "ccp_alpha": one.ccp_alpha,
-                "uses_last_action": one.uses_last_action,
+                "history": one.history.value,
                 "figures": _encode_figures(one.figures),
             }
             for one in provenance.channels
@@ -188,6 +197,7 @@ def _encode_figures(figures: Figures) -> Json:
         "teacher_forced_agreement": figures.teacher_forced_agreement,
         "own_history_agreement": figures.own_history_agreement,
         "held_out_rows": figures.held_out_rows,
+        "mean_recall": figures.mean_recall,
     }
 
 
@@ -222,16 +232,25 @@ def _encode_node(node: nodes.Node) -> Json:
 
 def _encode_condition(condition: Condition) -> Json:
     match condition:
-        case Threshold(feature=feature, value=value):
-            return {"type": "threshold", "feature": feature, "at_most": value}
-        case Interval(feature=feature, above=above, at_most=at_most):
-            return {"type": "interval", "feature": feature, "above": above, "at_most": at_most}
+        case Threshold(quantity=quantity, value=value):
+            return {"type": "threshold", **_encode_quantity(quantity), "at_most": value}
+        case Interval(quantity=quantity, above=above, at_most=at_most):
+            ends = {"above": above, "at_most": at_most}
+            return {"type": "interval", **_encode_quantity(quantity), **ends}
         case IsTrue(feature=feature):
             return {"type": "is_true", "feature": feature}
         case HasCategory(feature=feature, category=category):
             return {"type": "has_category", "feature": feature, "category": category}
+        case PreviousActionIs(action=action):
+            return {"type": "previous_action_is", "action": action}
         case LastActionIs(action=action, deciding=deciding):
             return {"type": "last_action_is", "action": action, "deciding": list(deciding)}
+
+
+def _encode_quantity(quantity: Quantity) -> Json:
+    if isinstance(quantity, Difference):
+        return {"feature": quantity.minuend, "minus": quantity.subtrahend}
+    return {"feature": quantity}
 
 
 def _shown(value: object) -> str:
@@ -330,14 +349,20 @@ def _learned_tree(place: _Place) -> LearnedTree:
     if not isinstance(place.value, dict) or place.value.get("format") != FORMAT:
         raise DocumentError(f"the document does not say that its format is {FORMAT!r}.")
     version = place.value.get("version")
-    if isinstance(version, bool) or version not in _READ:
+    if isinstance(version, bool) or not isinstance(version, int) or version not in _ADDED:
         raise DocumentError(
             f"the document has version {_shown(version)}: "
-            f"this release of rebt_ros reads the versions {' and '.join(map(str, _READ))}."
+            f"this release of rebt_ros reads the versions {' and '.join(map(str, _ADDED))}."
         )
-    since_2 = ("shown",) if version == VERSION else ()
     fields = place.fields(
-        "format", "version", "features", "actions", "tree", "suggestions", "provenance", *since_2
+        "format",
+        "version",
+        "features",
+        "actions",
+        "tree",
+        "suggestions",
+        "provenance",
+        *_ADDED[version],
     )
     try:
         return LearnedTree(
@@ -346,7 +371,8 @@ def _learned_tree(place: _Place) -> LearnedTree:
             tree=_node(fields["tree"], DEEPEST_TREE),
             provenance=_provenance(fields["provenance"]),
             suggestions=fields["suggestions"].items(_suggestion),
-            shown=fields["shown"].items(_shown_channel) if since_2 else (),
+            shown=fields["shown"].items(_shown_channel) if "shown" in fields else (),
+            row_kind=fields["row_kind"].one_of(RowKind) if "row_kind" in fields else RowKind.EVENT,
         )
     except ValueError as err:
         raise DocumentError(f"the document contradicts itself: {_cut(str(err), 200)}.") from err
@@ -413,10 +439,10 @@ def _provenance(place: _Place) -> Provenance:
         "max_depth",
         "ccp_alpha",
         "root",
-        "uses_last_action",
         "figures",
-        optional=("channels",),
+        optional=("channels", "late_rows", "late_seconds", *_HISTORY),
     )
+    late = fields.get("late_seconds")
     return Provenance(
         demonstrations=fields["demonstrations"].whole(),
         rows=fields["rows"].whole(),
@@ -424,19 +450,34 @@ def _provenance(place: _Place) -> Provenance:
         max_depth=fields["max_depth"].or_null(lambda: fields["max_depth"].whole(1)),
         ccp_alpha=fields["ccp_alpha"].number(0),
         root=fields["root"].one_of(Root),
-        uses_last_action=fields["uses_last_action"].truth(),
+        history=_history(place, fields),
         figures=_figures(fields["figures"]),
         channels=fields["channels"].items(_channel) if "channels" in fields else (),
+        late_rows=fields["late_rows"].whole() if "late_rows" in fields else 0,
+        late_seconds=late.or_null(lambda: late.number(0)) if late else None,
     )
 
 
+#: How version 3 says what the tree may test of what was done before, and how earlier ones did.
+_HISTORY = ("history", "uses_last_action")
+
+
+def _history(place: _Place, fields: Mapping[str, _Place]) -> History:
+    given = [name for name in _HISTORY if name in fields]
+    if len(given) != 1:
+        raise DocumentError(f"{place.path} must have either {' or '.join(map(repr, _HISTORY))}.")
+    if "history" in fields:
+        return fields["history"].one_of(History)
+    return History.LAST if fields["uses_last_action"].truth() else History.NONE
+
+
 def _channel(place: _Place) -> ChannelProvenance:
-    fields = place.fields("channel", "rows", "ccp_alpha", "uses_last_action", "figures")
+    fields = place.fields("channel", "rows", "ccp_alpha", "figures", optional=_HISTORY)
     return ChannelProvenance(
         channel=fields["channel"].text(),
         rows=fields["rows"].whole(),
         ccp_alpha=fields["ccp_alpha"].number(0),
-        uses_last_action=fields["uses_last_action"].truth(),
+        history=_history(place, fields),
         figures=_figures(fields["figures"]),
     )
 
@@ -447,13 +488,16 @@ def _figures(place: _Place) -> Figures:
         "teacher_forced_agreement",
         "own_history_agreement",
         "held_out_rows",
+        optional=("mean_recall",),
     )
+    recall = fields.get("mean_recall")
     forced, own = fields["teacher_forced_agreement"], fields["own_history_agreement"]
     return Figures(
         fidelity_mismatches=fields["fidelity_mismatches"].whole(),
         teacher_forced_agreement=forced.or_null(lambda: forced.number(0, 1)),
         own_history_agreement=own.or_null(lambda: own.number(0, 1)),
         held_out_rows=fields["held_out_rows"].whole(),
+        mean_recall=recall.or_null(lambda: recall.number(0, 1)) if recall else None,
     )
 
 
@@ -487,20 +531,27 @@ def _node(place: _Place, levels: int) -> nodes.Node:
 def _condition(place: _Place) -> Condition:
     match place.tag("type"):
         case "threshold":
-            fields = place.fields("type", "feature", "at_most")
-            return Threshold(fields["feature"].text(), fields["at_most"].number())
+            fields = place.fields("type", "feature", "at_most", optional=("minus",))
+            return Threshold(_quantity(fields), fields["at_most"].number())
         case "interval":
-            fields = place.fields("type", "feature", "above", "at_most")
+            fields = place.fields("type", "feature", "above", "at_most", optional=("minus",))
             above, at_most = fields["above"].number(), fields["at_most"].number()
-            return Interval(fields["feature"].text(), above, at_most)
+            return Interval(_quantity(fields), above, at_most)
         case "is_true":
             return IsTrue(place.fields("type", "feature")["feature"].text())
         case "has_category":
             fields = place.fields("type", "feature", "category")
             return HasCategory(fields["feature"].text(), fields["category"].text())
+        case "previous_action_is":
+            return PreviousActionIs(place.fields("type", "action")["action"].text())
         case "last_action_is":
             fields = place.fields("type", "action", "deciding")
             deciding = fields["deciding"].items(_Place.text)
             return LastActionIs(fields["action"].text(), deciding)
         case unknown:
             raise DocumentError(f"{place.path} has the unknown type {_shown(unknown)}.")
+
+
+def _quantity(fields: Mapping[str, _Place]) -> Quantity:
+    feature = fields["feature"].text()
+    return Difference(feature, fields["minus"].text()) if "minus" in fields else feature

@@ -8,8 +8,18 @@ from enum import Enum
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.shown import ShownChannel, problems
+from rebt_ros.demonstration.demonstration import RowKind
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.logic.conditions import HasCategory, Interval, IsTrue, LastActionIs, Threshold
+from rebt_ros.logic.conditions import (
+    HasCategory,
+    Interval,
+    IsTrue,
+    LastActionIs,
+    PreviousActionIs,
+    Threshold,
+    features_of,
+)
 
 
 class SuggestionKind(Enum):
@@ -51,10 +61,13 @@ class Figures:
     fidelity_mismatches: int
     """Rows, of all there were, on which the tree differs from its decision tree."""
     teacher_forced_agreement: float | None
-    """Share of held-out rows on which it agrees, LAT being the demonstrator's."""
+    """Share of held-out rows on which it agrees, after what the demonstrator did before."""
     own_history_agreement: float | None
-    """Share of held-out rows on which it agrees, LAT being its own earlier choices."""
+    """Share of held-out rows on which it agrees, after its own earlier choices."""
     held_out_rows: int
+    mean_recall: float | None = None
+    """Mean, over the actions of the held-out rows, of the share of each one's rows on which the
+    tree takes it, after its own earlier choices."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +77,7 @@ class ChannelProvenance:
     channel: str
     rows: int
     ccp_alpha: float
-    uses_last_action: bool
+    history: History
     figures: Figures
 
 
@@ -78,11 +91,20 @@ class Provenance:
     max_depth: int | None
     ccp_alpha: float
     root: Root
-    uses_last_action: bool
-    """Whether the decision tree was shown LAT."""
+    history: History
+    """What the decision tree could test of what was done before; of several channels, any one."""
     figures: Figures
     channels: tuple[ChannelProvenance, ...] = ()
     """Of each channel, where there are several."""
+    late_rows: int = 0
+    """How late the demonstrator acted: actions were learned as of so many rows before."""
+    late_seconds: float | None = None
+    """The same in seconds, where stamps tell the time."""
+
+    @property
+    def uses_last_action(self) -> bool:
+        """Whether the decision tree could test what was done before."""
+        return self.history is not History.NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +124,8 @@ class LearnedTree:
     suggestions: tuple[Suggestion, ...] = field(default=())
     shown: tuple[ShownChannel, ...] = ()
     """What each channel was learned from, leaf by leaf; empty where that is not known."""
+    row_kind: RowKind = RowKind.EVENT
+    """What the previous action is when the tree runs: see `TreeRuntime`."""
 
     def __post_init__(self) -> None:
         for problem in self._problems():
@@ -127,14 +151,18 @@ def _problems_of(
     node: nodes.Condition, categories: dict[str, frozenset[str]], labels: set[str]
 ) -> Iterator[str]:
     match node.literal.condition:
-        case Threshold(feature=name) | Interval(feature=name) | IsTrue(feature=name):
-            if name not in categories:
-                yield f"feature {name!r} is not declared"
+        case Threshold() | Interval() | IsTrue() as condition:
+            for name in features_of(condition):
+                if name not in categories:
+                    yield f"feature {name!r} is not declared"
         case HasCategory(feature=name, category=category):
             if name not in categories:
                 yield f"feature {name!r} is not declared"
             elif category not in categories[name]:
                 yield f"feature {name!r} has no category {category!r}"
+        case PreviousActionIs(action=action):
+            if action not in labels:
+                yield f"previous action {action!r} is not declared"
         case LastActionIs(action=action, deciding=deciding):
             for label in (action, *deciding):
                 if label not in labels:

@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from rebt_ros.logic.conditions import Literal
+from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs, features_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +128,16 @@ def actions(node: Node) -> tuple[Action, ...]:
 def conditions(node: Node) -> tuple[Condition, ...]:
     """Each condition of the tree once, in the order in which it first occurs."""
     return tuple(dict.fromkeys(one for one in walk(node) if isinstance(one, Condition)))
+
+
+def features(node: Node) -> frozenset[str]:
+    """The names of the features that the tree tests."""
+    return frozenset(
+        name
+        for one in conditions(node)
+        if not isinstance(one.literal.condition, PreviousActionIs | LastActionIs)
+        for name in features_of(one.literal.condition)
+    )
 
 
 def policies(node: Node) -> dict[str, Node]:

@@ -20,29 +20,46 @@ from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import (
     Condition,
+    Difference,
     HasCategory,
+    HistoryCondition,
     Interval,
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
+    Quantity,
+    StateCondition,
     Threshold,
 )
 
-#: What a state tells alone.
-StateCondition: TypeAlias = Threshold | Interval | IsTrue | HasCategory
-#: Tells in which of the states a LAT condition holds, or for all of them at once.
-LastActionTest: TypeAlias = Callable[[LastActionIs], BoolArray | bool]
+#: Tells in which of the states a condition on the history holds, or for all of them at once.
+HistoryTest: TypeAlias = Callable[[HistoryCondition], BoolArray | bool]
 
 
-def last_action_column(labels: tuple[str, ...], last: IntArray) -> LastActionTest:
-    """LAT as a decision tree reads it: one column, whatever action is being decided."""
+def history_columns(labels: tuple[str, ...], previous: IntArray, last: IntArray) -> HistoryTest:
+    """The history as a decision tree reads it: columns, whatever action is being decided."""
     code = {label: position for position, label in enumerate(labels)}
-    return lambda condition: last == code.get(condition.action, NO_ACTION - 1)
+
+    def holds(condition: HistoryCondition) -> BoolArray:
+        column = previous if isinstance(condition, PreviousActionIs) else last
+        return np.equal(column, code.get(condition.action, NO_ACTION - 1))
+
+    return holds
 
 
-def last_action_of(history: ActionHistory) -> LastActionTest:
-    """LAT as an executed tree reads it: from one history, by the rule that asks."""
-    return lambda condition: history.before(*condition.deciding) == condition.action
+def as_it_stands(history: ActionHistory) -> HistoryTest:
+    """The history as an executed tree reads it; of LAT, by the rule that asks."""
+    return partial(holds_after, history)
+
+
+def holds_after(history: ActionHistory, condition: HistoryCondition) -> bool:
+    """Whether a condition holds after what was done."""
+    match condition:
+        case PreviousActionIs(action=action):
+            return history.previous == action
+        case LastActionIs(action=action, deciding=deciding):
+            return history.before(*deciding) == action
 
 
 #: Rows that are evaluated at a time: so many that what Python does once per node does not matter,
@@ -66,7 +83,7 @@ class States:
     features: tuple[Feature, ...]
     values: FloatArray
     """Shape (rows, features): numbers, 0 or 1, positions in a feature's categories, or NaN."""
-    last_action: LastActionTest
+    history: HistoryTest
 
     def __len__(self) -> int:
         return len(self.values)
@@ -74,28 +91,45 @@ class States:
     def satisfy(self, literal: Literal) -> BoolArray:
         """Where the literal holds, shape (rows,)."""
         condition = literal.condition
-        if isinstance(condition, LastActionIs):
-            holds = np.broadcast_to(self.last_action(condition), len(self))
+        if isinstance(condition, PreviousActionIs | LastActionIs):
+            holds = np.broadcast_to(self.history(condition), len(self))
         else:
-            place = self.place(condition.feature)
-            holds = _test(condition, self.features[place], self.values[:, place])
+            holds = _test(condition, self._column, self._feature)
         return holds if literal.positive else ~holds
+
+    def _column(self, name: str) -> FloatArray:
+        return self.values[:, self.place(name)]
+
+    def _feature(self, name: str) -> Feature:
+        return self.features[self.place(name)]
 
     def place(self, feature: str) -> int:
         """The column of a feature."""
         return next(index for index, one in enumerate(self.features) if one.name == feature)
 
 
-def _test(condition: StateCondition, feature: Feature, column: FloatArray) -> BoolArray:
+def _test(
+    condition: StateCondition,
+    column: Callable[[str], FloatArray],
+    feature: Callable[[str], Feature],
+) -> BoolArray:
+    """Where a condition holds, given what the features hold and what they are."""
     match condition:
-        case Threshold(value=value):
-            return np.less_equal(column, value)
-        case Interval(above=above, at_most=at_most):
-            return np.less(above, column) & np.less_equal(column, at_most)
-        case IsTrue():
-            return np.equal(column, 1)
-        case HasCategory(category=category):
-            return np.equal(column, feature.categories.index(category))
+        case Threshold(quantity=quantity, value=value):
+            return np.less_equal(_values(quantity, column), value)
+        case Interval(quantity=quantity, above=above, at_most=at_most):
+            values = _values(quantity, column)
+            return np.less(above, values) & np.less_equal(values, at_most)
+        case IsTrue(feature=name):
+            return np.equal(column(name), 1)
+        case HasCategory(feature=name, category=category):
+            return np.equal(column(name), feature(name).categories.index(category))
+
+
+def _values(quantity: Quantity, column: Callable[[str], FloatArray]) -> FloatArray:
+    if isinstance(quantity, Difference):
+        return np.subtract(column(quantity.minuend), column(quantity.subtrahend))
+    return column(quantity)
 
 
 def triggered(tree: nodes.Node, states: States) -> dict[nodes.Action, BoolArray]:
@@ -144,7 +178,7 @@ class Plan:
         self._root = _step(tree, place, acted)
         # Of what is tested, the columns that are read.
         by_name = {feature.name: number for number, feature in reversed([*enumerate(features)])}
-        read = {by_name[one.feature] for one in conditions if not isinstance(one, LastActionIs)}
+        read = {by_name[name] for name in nodes.features(tree)}
         self._columns = tuple(sorted(read))
         self._row = {features[column].name: row for row, column in enumerate(self._columns)}
         self._features = features
@@ -162,36 +196,41 @@ class Plan:
 
     def ticked(self, states: States) -> Iterator[tuple[slice, list[BoolArray]]]:
         """In which rows each action is ticked, part by part of the rows."""
-        last = {
-            number: states.last_action(condition)
+        before = {
+            number: states.history(condition)
             for number, condition in enumerate(self._conditions)
-            if isinstance(condition, LastActionIs)
+            if isinstance(condition, PreviousActionIs | LastActionIs)
         }
         columns = np.empty((len(self._columns), min(len(states), _ROWS_AT_A_TIME)))
         for start in range(0, len(states), _ROWS_AT_A_TIME):
             rows = slice(start, min(start + _ROWS_AT_A_TIME, len(states)))
             count = rows.stop - start
             _copy_columns(states.values[rows], self._columns, columns)
-            part = _Part(count, len(self.actions), partial(self._holds, columns, last, rows))
+            part = _Part(count, len(self.actions), partial(self._holds, columns, before, rows))
             self._root(part, _packed(np.ones(count, dtype=bool)))
             yield rows, [_unpacked(mask, count) for mask in part.ticked]
 
     def _holds(
         self,
         columns: FloatArray,
-        last: Mapping[int, BoolArray | bool],
+        before: Mapping[int, BoolArray | bool],
         rows: slice,
         number: int,
     ) -> _Mask:
         """Where a condition holds in a part of the rows."""
         condition, count = self._conditions[number], rows.stop - rows.start
-        if isinstance(condition, LastActionIs):
-            found = last[number]
+        if isinstance(condition, PreviousActionIs | LastActionIs):
+            found = before[number]
             where = found[rows] if isinstance(found, np.ndarray) else np.full(count, found)
             return _packed(where)
-        row = self._row[condition.feature]
-        feature = self._features[self._columns[row]]
-        return _packed(_test(condition, feature, columns[row, :count]))
+
+        def column(name: str) -> FloatArray:
+            return columns[self._row[name], :count]
+
+        return _packed(_test(condition, column, self._feature))
+
+    def _feature(self, name: str) -> Feature:
+        return self._features[self._columns[self._row[name]]]
 
 
 class _Part:

@@ -10,6 +10,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import py_trees
@@ -17,15 +18,20 @@ from py_trees.common import Status
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.prediction import holds_after
 from rebt_ros.behavior_tree.wording import Wording
+from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import (
     Condition,
+    Difference,
     HasCategory,
     Interval,
     IsTrue,
     LastActionIs,
+    PreviousActionIs,
+    Quantity,
     Threshold,
 )
 
@@ -75,6 +81,10 @@ def executable(tree: nodes.Node) -> nodes.Node:
 class TreeRuntime:
     """A learned tree, ready to be ticked.
 
+    The previous action, which conditions may test, is on each channel the command of the last tick
+    where the tree was learned from samples.  Where it was learned from events, it is the action
+    that ended last, be it that it was interrupted.
+
     Args:
         learned: The tree and its features.
         commander: Carries out the actions.
@@ -95,7 +105,9 @@ class TreeRuntime:
         self.histories.update(histories or {})
         self._commander = SucceedAtOnce() if commander is None else commander
         self._state: Sequence[float] = ()
-        self._ticked: list[nodes.Action] = []
+        self._ticked: list[tuple[nodes.Action, Status]] = []
+        # Of trees that were learned from events, what runs on each channel.
+        self._running: dict[str, str] = {}
         self._wording = Wording(learned)
         self._place = {feature.name: place for place, feature in enumerate(learned.features)}
         self._behaviours = self._build_root(learned.tree if tree is None else tree)
@@ -111,9 +123,24 @@ class TreeRuntime:
         self._ticked.clear()
         self.root.tick_once()
         # Afterwards, so that all conditions of one tick see the same history.
-        for action in self._ticked:
-            self.histories[action.channel].take(action.label)
-        return Tick(self.root.status, tuple(self._ticked))
+        for action, status in self._ticked:
+            self._note(action, status)
+        return Tick(self.root.status, tuple(action for action, _ in self._ticked))
+
+    def _note(self, action: nodes.Action, status: Status) -> None:
+        history = self.histories[action.channel]
+        if self.learned.row_kind is RowKind.SAMPLE:
+            history.take(action.label)
+            return
+        running = self._running.pop(action.channel, action.label)
+        if running != action.label:
+            # Another action has taken its place, and so ended it.
+            history.take(running)
+        if status is Status.RUNNING:
+            self._running[action.channel] = action.label
+            history.begin(action.label)
+        else:
+            history.take(action.label)
 
     @property
     def tip(self) -> str:
@@ -124,6 +151,9 @@ class TreeRuntime:
     def halt(self) -> None:
         """Interrupts whatever runs; the next tick starts afresh, with the same histories."""
         self.root.stop(Status.INVALID)
+        for channel, label in self._running.items():
+            self.histories[channel].previous = label
+        self._running.clear()
 
     def snapshot(self) -> tuple[str, ...]:
         """The status name of every node, each parent before its children."""
@@ -191,20 +221,34 @@ class TreeRuntime:
                 return py_trees.decorators.Repeat(name=name, child=sequence, num_success=-1)
 
     def _test_condition(self, condition: Condition, history: ActionHistory) -> Callable[[], bool]:
-        if isinstance(condition, LastActionIs):
-            action, deciding = condition.action, condition.deciding
-            return lambda: history.before(*deciding) == action
-        place = self._place[condition.feature]
         match condition:
-            case Threshold(value=value):
+            case PreviousActionIs() | LastActionIs():
+                return partial(holds_after, history, condition)
+            case Threshold(quantity=str(name), value=value):
+                # Most conditions are of this kind, and ticked very often: no call in between.
+                place = self._place[name]
                 return lambda: self._state[place] <= value
-            case Interval(above=above, at_most=at_most):
-                return lambda: above < self._state[place] <= at_most
-            case IsTrue():
+            case Threshold(quantity=quantity, value=value):
+                read = self._reading(quantity)
+                return lambda: read() <= value
+            case Interval(quantity=quantity, above=above, at_most=at_most):
+                read = self._reading(quantity)
+                return lambda: above < read() <= at_most
+            case IsTrue(feature=name):
+                place = self._place[name]
                 return lambda: self._state[place] == 1
-            case HasCategory(category=name):
-                code = self.learned.features[place].categories.index(name)
+            case HasCategory(feature=name, category=category):
+                place = self._place[name]
+                code = self.learned.features[place].categories.index(category)
                 return lambda: self._state[place] == code
+
+    def _reading(self, quantity: Quantity) -> Callable[[], float]:
+        """What reads a quantity from the state."""
+        if isinstance(quantity, Difference):
+            minuend, subtrahend = self._place[quantity.minuend], self._place[quantity.subtrahend]
+            return lambda: self._state[minuend] - self._state[subtrahend]
+        place = self._place[quantity]
+        return lambda: self._state[place]
 
 
 def _parallel(
@@ -248,7 +292,11 @@ class _Command(_Leaf):
     """An action, carried out by the commander."""
 
     def __init__(
-        self, name: str, action: nodes.Action, commander: Commander, ticked: list[nodes.Action]
+        self,
+        name: str,
+        action: nodes.Action,
+        commander: Commander,
+        ticked: list[tuple[nodes.Action, Status]],
     ) -> None:
         super().__init__(name)
         self._action = action
@@ -256,8 +304,9 @@ class _Command(_Leaf):
         self._ticked = ticked
 
     def update(self) -> Status:
-        self._ticked.append(self._action)
-        return self._commander.update(self._action)
+        status = self._commander.update(self._action)
+        self._ticked.append((self._action, status))
+        return status
 
     def terminate(self, new_status: Status) -> None:
         # py_trees may terminate a behaviour twice; only a running action is interrupted.

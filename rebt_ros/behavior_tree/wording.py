@@ -5,7 +5,9 @@ Two different conditions of one tree never read the same:
 - Names that could be taken for something else (``a = b``, ``not docked``, an empty one) are quoted;
   what cannot be printed is escaped, so every text is a single line.
 - A threshold, or end of an interval, is rounded, but never past the middle between it and the next
-  one on the same feature, so the numbers stay distinct and in order.
+  one on the same quantity, so the numbers stay distinct and in order.
+- The difference of two features reads ``left ≤ right`` where its threshold is 0, and
+  ``left − right ≤ 0.3`` elsewhere.
 """
 
 from __future__ import annotations
@@ -20,11 +22,14 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, SuggestionKind
 from rebt_ros.logic.conditions import (
     KNOWN,
+    Difference,
     HasCategory,
     Interval,
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
+    Quantity,
     Threshold,
 )
 
@@ -70,18 +75,20 @@ class Wording:
         self._lat_sequences = {
             id(one.subtree) for one in suggestions if one.kind is SuggestionKind.LAT_SEQUENCE
         }
-        thresholds: dict[str, list[float]] = {}
+        thresholds: dict[Quantity, list[float]] = {}
         deciding: dict[str, set[tuple[str, ...]]] = {}
         for tree in trees:
             for node in nodes.conditions(tree):
                 match node.literal.condition:
-                    case Threshold(feature=name, value=value) if value != KNOWN:
-                        thresholds.setdefault(name, []).append(value)
-                    case Interval(feature=name, above=above, at_most=at_most):
-                        thresholds.setdefault(name, []).extend((above, at_most))
+                    case Threshold(quantity=quantity, value=value) if value != KNOWN:
+                        thresholds.setdefault(quantity, []).append(value)
+                    case Interval(quantity=quantity, above=above, at_most=at_most):
+                        thresholds.setdefault(quantity, []).extend((above, at_most))
                     case LastActionIs(action=action, deciding=group):
                         deciding.setdefault(action, set()).add(group)
-        self._numbers = {name: distinct_texts(values) for name, values in thresholds.items()}
+        self._numbers = {
+            quantity: distinct_texts(values) for quantity, values in thresholds.items()
+        }
         self._deciding_matters = {action for action, groups in deciding.items() if len(groups) > 1}
 
     def literal(self, literal: Literal) -> str:
@@ -91,24 +98,29 @@ class Wording:
         """
         positive = literal.positive
         match literal.condition:
-            case Threshold(feature=name, value=value) if value == KNOWN:
-                return f"{_feature(name)} is {'known' if positive else 'missing'}"
-            case Threshold(feature=name, value=value):
-                return f"{_feature(name)} {'≤' if positive else '>'} {self._number(name, value)}"
-            case Interval(feature=name, above=above, at_most=at_most):
-                low, high = self._number(name, above), self._number(name, at_most)
-                between = f"{low} < {_feature(name)} ≤ {high}"
+            case Threshold(quantity=quantity, value=value) if value == KNOWN:
+                return f"{_quantity(quantity)} is {'known' if positive else 'missing'}"
+            case Threshold(quantity=Difference(minuend=one, subtrahend=other), value=0):
+                return f"{_feature(one)} {'≤' if positive else '>'} {_feature(other)}"
+            case Threshold(quantity=quantity, value=value):
+                sign = "≤" if positive else ">"
+                return f"{_quantity(quantity)} {sign} {self._number(quantity, value)}"
+            case Interval(quantity=quantity, above=above, at_most=at_most):
+                low, high = self._number(quantity, above), self._number(quantity, at_most)
+                between = f"{low} < {_quantity(quantity)} ≤ {high}"
                 return between if positive else f"not ({between})"
             case IsTrue(feature=name):
                 return _feature(name) if positive else f"not {_feature(name)}"
             case HasCategory(feature=name, category=category):
                 return f"{_feature(name)} {'=' if positive else '≠'} {_name(category)}"
+            case PreviousActionIs(action=action):
+                return f"{'' if positive else 'not '}doing {_name(action)}"
             case LastActionIs() as last:
                 sign = "=" if positive else "≠"
                 return f"last action {sign} {_name(last.action)}{self._before(last)}"
 
-    def _number(self, feature: str, value: float) -> str:
-        return self._numbers.get(feature, {}).get(value, repr(value))
+    def _number(self, quantity: Quantity, value: float) -> str:
+        return self._numbers.get(quantity, {}).get(value, repr(value))
 
     def _before(self, last: LastActionIs) -> str:
         if last.action not in self._deciding_matters or not last.deciding:
@@ -257,6 +269,12 @@ def _feature(name: str) -> str:
     return _quoted(name) if _is_number(name) else _name(name)
 
 
+def _quantity(quantity: Quantity) -> str:
+    if isinstance(quantity, Difference):
+        return f"{_feature(quantity.minuend)} − {_feature(quantity.subtrahend)}"
+    return _feature(quantity)
+
+
 def _word(name: str) -> str:
     """A name in a list of names."""
     return _quoted(name) if any(one.isspace() or one in "()" for one in name) else _name(name)
@@ -271,7 +289,8 @@ def _is_plain(name: str) -> bool:
         and name[0] not in _QUOTES
         and _SIGNS.isdisjoint(name)
         and not (lower.startswith("not") and not _continues_word(lower[3:]))
-        and not lower.startswith("last action")
+        and not lower.startswith(("last action", "doing "))
+        and " − " not in name
         and not lower.endswith((" is known", " is missing"))
         and " (before " not in lower
         and " @" not in name
@@ -306,22 +325,32 @@ def _exactly(literal: Literal) -> str:
     """The literal with every digit, and with what it says of missing values."""
     missing = "" if literal.positive else ", or missing"
     match literal.condition:
-        case Threshold(feature=name, value=value) if value == KNOWN:
-            return f"{_quoted(name)} is {'known' if literal.positive else 'missing'}"
-        case Threshold(feature=name, value=value):
-            return f"{_quoted(name)} {'<=' if literal.positive else '>'} {value!r}{missing}"
-        case Interval(feature=name, above=above, at_most=at_most):
-            between = f"{above!r} < {_quoted(name)} <= {at_most!r}"
+        case Threshold(quantity=quantity, value=value) if value == KNOWN:
+            return f"{_quoted_quantity(quantity)} is {'known' if literal.positive else 'missing'}"
+        case Threshold(quantity=quantity, value=value):
+            sign = "<=" if literal.positive else ">"
+            return f"{_quoted_quantity(quantity)} {sign} {value!r}{missing}"
+        case Interval(quantity=quantity, above=above, at_most=at_most):
+            between = f"{above!r} < {_quoted_quantity(quantity)} <= {at_most!r}"
             return between if literal.positive else f"not ({between}){missing}"
         case IsTrue(feature=name):
             return f"{_quoted(name)} is {1 if literal.positive else 0}{missing}"
         case HasCategory(feature=name, category=category):
             sign = "=" if literal.positive else "≠"
             return f"{_quoted(name)} {sign} {_quoted(category)}{missing}"
+        case PreviousActionIs(action=action):
+            answer = "is" if literal.positive else "is not"
+            return f"the action before {answer} {_quoted(action)}"
         case LastActionIs(action=action, deciding=deciding):
             other = " or ".join(map(_quoted, deciding)) or "the action being decided"
             answer = "is" if literal.positive else "is not"
             return f"the most recent action other than {other} {answer} {_quoted(action)}"
+
+
+def _quoted_quantity(quantity: Quantity) -> str:
+    if isinstance(quantity, Difference):
+        return f"{_quoted(quantity.minuend)} - {_quoted(quantity.subtrahend)}"
+    return _quoted(quantity)
 
 
 def _resuming(memory: bool) -> str:

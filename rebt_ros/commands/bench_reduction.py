@@ -23,8 +23,10 @@ from rebt_ros.algorithms.rules import leaf_rules
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import aligned, run
+from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.decision_tree.tree import DecisionTree, Leaf
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.evaluation import teacher_forced_choices
@@ -144,7 +146,7 @@ def compare(config: ExperimentConfig, ticks: int, seed: int) -> ConfigurationRes
     if not len(demonstration):
         return ConfigurationResult(0, comparisons, 0)
     (table,) = tabulate([demonstration])
-    fitted = fit(table, last_action=True, max_depth=MAX_DEPTH)
+    fitted = fit(table, vocabulary=Vocabulary(History.LAST), max_depth=MAX_DEPTH)
     undecided = 0
     for alpha in fitted.path.alphas:
         trained = fitted.at(float(alpha))

@@ -16,12 +16,14 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import add_input_options, input_options, run, use_color
+from rebt_ros.commands.shell import add_input_options, aligned, input_options, run, use_color
 from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.errors import OptionError
 from rebt_ros.options import LearnOptions, Use
 from rebt_ros.pipeline import summary_sentence
+from rebt_ros.report import FORECAST, LearningReport
 
 _REDUCTIONS = {
     "domain": "do not use that thresholds, categories and last actions exclude each other",
@@ -29,6 +31,21 @@ _REDUCTIONS = {
     "priority": "keep each rule to its own states, instead of ordering them by priority",
     "intervals": "ask x > 0.3 and x ≤ 0.5 one after the other, instead of 0.3 < x ≤ 0.5",
 }
+
+
+#: Options that are left as they are unless they are asked for, by their names in `LearnOptions`.
+_ASKED = (
+    "delta",
+    "max_depth",
+    "ccp_alpha",
+    "history",
+    "differences",
+    "reaction_time",
+    "readable_thresholds",
+    "refit",
+    "root",
+    "psa",
+)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -119,16 +136,31 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
         "--ccp-alpha",
         type=_ccp_alpha,
         metavar="ALPHA|auto",
-        help="complexity parameter of pruning, larger means smaller trees; auto: the smallest "
-        "tree within one standard error of the best in cross-validation (default: auto)",
+        help="complexity parameter of pruning, larger means smaller trees; auto: the level with "
+        "the best mean recall of the actions in cross-validation (default: auto)",
     )
     learning.add_argument(
-        "--last-action",
+        "--history",
+        type=_history,
+        metavar=f"auto|{_values(History)}",
+        help="what the tree may test of what was done before: the previous action, the last "
+        "action taken of the paper, or nothing; auto: the previous action where that raises mean "
+        "recall in cross-validation (default: auto)",
+    )
+    learning.add_argument(
+        "--differences",
         type=Use,
         choices=list(Use),
         metavar=_values(Use),
-        help="whether the tree may test the last action taken; auto: only where that raises "
-        "own-history agreement in cross-validation (default: auto)",
+        help="whether the tree may compare two features, as in left < right; auto: where that "
+        "makes it a quarter smaller at the same agreement (default: auto)",
+    )
+    learning.add_argument(
+        "--reaction-time",
+        type=_seconds,
+        metavar="SECONDS|auto",
+        help="how late the demonstrator acted, to be undone before learning; auto: read off the "
+        "demonstrations where rows are samples, else 0 (default: auto)",
     )
     learning.add_argument(
         "--delta",
@@ -175,6 +207,13 @@ def _add_form(parser: argparse.ArgumentParser) -> None:
             help=_REDUCTIONS[reduction.name],
         )
     form.add_argument(
+        "--exact-thresholds",
+        dest="readable_thresholds",
+        action="store_false",
+        default=None,
+        help="leave thresholds halfway between two rows, not at round values that they share",
+    )
+    form.add_argument(
         "--no-routines",
         dest="routines",
         action="store_false",
@@ -193,8 +232,26 @@ def _add_judging(parser: argparse.ArgumentParser, defaults: LearnOptions) -> Non
         "there are several (default: %(default)s)",
     )
     judging.add_argument(
-        "--refit", action="store_true", help="once judged, learn again from all rows"
+        "--refit",
+        action=argparse.BooleanOptionalAction,
+        help="once judged, learn again from all rows (default: yes; with --paper: no)",
     )
+
+
+def _recalls(report: LearningReport) -> Iterator[str]:
+    """The recall of each action as a table, and what to hold it against."""
+    rows = [("  action", "shown", "recall")]
+    for action in report.actions:
+        recall = "-" if action.recall is None else f"{action.recall:.1%}"
+        rows.append((f"  {action.label}", str(action.rows), recall))
+    yield from aligned(rows)
+    if report.mean_recall is not None and report.agreement is not None:
+        yield (
+            f"  mean recall {report.mean_recall:.1%}; agreement {report.agreement:.1%} in "
+            f"cross-validation, where always taking the most frequent action would reach "
+            f"{report.most_frequent:.1%}"
+        )
+        yield f"  (agreement in cross-validation is the forecast of success: {FORECAST})"
 
 
 def _values(kind: type[Enum]) -> str:
@@ -209,11 +266,19 @@ def _ccp_alpha(text: str) -> float | Literal["auto"]:
     return "auto" if text == "auto" else float(text)
 
 
+def _seconds(text: str) -> float | Literal["auto"]:
+    return "auto" if text == "auto" else float(text)
+
+
+def _history(text: str) -> History | Literal["auto"]:
+    return "auto" if text == "auto" else History(text)
+
+
 def _options(parsed: argparse.Namespace) -> LearnOptions:
     """The defaults, or the paper's settings, with what was asked for."""
     asked: dict[str, Any] = {
         name: None if (value := getattr(parsed, name)) == "auto" else value
-        for name in ("delta", "max_depth", "ccp_alpha", "root", "last_action", "psa")
+        for name in _ASKED
         if getattr(parsed, name) is not None
     }
     reductions = Reductions(**{one.name: getattr(parsed, one.name) for one in fields(Reductions)})
@@ -221,7 +286,6 @@ def _options(parsed: argparse.Namespace) -> LearnOptions:
         LearnOptions.paper() if parsed.paper else LearnOptions(reductions=reductions),
         **asked,
         test_fraction=parsed.test_fraction,
-        refit=parsed.refit,
         attach=tuple(parsed.attach),
         psa_choice=parsed.psa_as,
         routines=parsed.routines and not parsed.paper,
@@ -253,6 +317,10 @@ def _learn(parsed: argparse.Namespace) -> None:
     print(render_text(replace(result.learned, suggestions=()), color=use_color()))
     print(summary_sentence(result.learned))
     print(_judgement(result))
+    for learning in result.learnings:
+        if len(result.learnings) > 1:
+            print(f"Channel {learning.table.channel}:")
+        print("\n".join(_recalls(learning.report)))
     for learning in result.learnings:
         channel = f"{learning.table.channel}: " if len(result.learnings) > 1 else ""
         for reason in learning.policy.reasons:
@@ -289,7 +357,7 @@ def _judgement(result: offline.OfflineLearning) -> str:
     figures = provenance.figures
     lines = [
         ("decision tree and behavior tree differ on", f"{figures.fidelity_mismatches} rows"),
-        ("tests the last action taken", "yes" if provenance.uses_last_action else "no"),
+        ("may test what was done before", provenance.history.value),
     ]
     if figures.own_history_agreement is not None:
         assert figures.teacher_forced_agreement is not None

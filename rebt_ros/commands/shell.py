@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from rebt_ros.demonstration.builder import StateTopic
+from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.errors import RebtError
 from rebt_ros.storage.inputs import InputOptions
 
@@ -77,6 +78,14 @@ def add_input_options(parser: argparse.ArgumentParser) -> None:
     tables.add_argument(
         "--no-header", action="store_true", help="the first line is a row; columns are x0, x1, …"
     )
+    tables.add_argument(
+        "--rows",
+        type=RowKind,
+        choices=list(RowKind),
+        metavar="|".join(kind.value for kind in RowKind),
+        help="what a row is: an action from its beginning to its end, or a sample of one that is "
+        "held (default: event where a column LABEL.outcome says how actions ended, else sample)",
+    )
     bags = parser.add_argument_group("bags")
     bags.add_argument(
         "--state-topic",
@@ -109,6 +118,7 @@ def input_options(arguments: argparse.Namespace) -> InputOptions:
     return InputOptions(
         labels=tuple(arguments.label),
         header=not arguments.no_header,
+        row_kind=arguments.rows,
         state_topics=tuple(map(_state_topic, arguments.state_topic)),
         action_topics=tuple(arguments.action_topic),
         sample_rate=arguments.sample_rate,

@@ -1,7 +1,10 @@
 """The table as the matrix that scikit-learn learns from, and back: what each column asks.
 
-A numeric feature is one column, a binary one as well; a categorical feature and LAT have one
-column for each category and action (one-hot).
+vocabulary
+    What a tree may test beside the features: differences of two of them, and a history.
+
+A numeric feature is one column, a binary one and a difference as well; a categorical feature and
+the history have one column for each category and action (one-hot).
 """
 
 from __future__ import annotations
@@ -11,15 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from rebt_ros.arrays import Float32Array, FloatArray, IntArray
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import (
     KNOWN,
     Condition,
+    Difference,
     HasCategory,
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
+    Quantity,
     Threshold,
 )
 
@@ -28,16 +35,27 @@ MISSING = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
-    """Column of a numeric feature."""
+class Vocabulary:
+    """What a decision tree may test beside the features."""
 
-    feature: str
+    history: History = History.NONE
+    differences: tuple[Difference, ...] = ()
+
+
+FEATURES_ALONE = Vocabulary()
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """Column of a quantity."""
+
+    quantity: Quantity
 
     def at_most(self, threshold: float) -> Literal:
         """The literal that holds where the column is at most `threshold`."""
         # No value lies between the largest one that is accepted (1e38) and the missing ones.
         beyond = threshold > MISSING / 3
-        return Literal(Threshold(self.feature, KNOWN if beyond else exact_threshold(threshold)))
+        return Literal(Threshold(self.quantity, KNOWN if beyond else exact_threshold(threshold)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +69,7 @@ class Indicator:
         return ~Literal(self.condition)
 
 
-def columns(table: DemonstrationTable, last_action: bool) -> tuple[Number | Indicator, ...]:
+def columns(table: DemonstrationTable, vocabulary: Vocabulary) -> tuple[Number | Indicator, ...]:
     """What each column of the encoded table asks."""
     asked: list[Number | Indicator] = []
     for feature in table.features:
@@ -61,13 +79,19 @@ def columns(table: DemonstrationTable, last_action: bool) -> tuple[Number | Indi
             asked.append(Indicator(IsTrue(feature.name)))
         else:
             asked += [Indicator(HasCategory(feature.name, one)) for one in feature.categories]
-    if last_action:
-        asked += [Indicator(LastActionIs(action)) for action in table.actions]
+    asked += map(Number, vocabulary.differences)
+    match vocabulary.history:
+        case History.PREVIOUS:
+            asked += [Indicator(PreviousActionIs(action)) for action in table.actions]
+        case History.LAST:
+            asked += [Indicator(LastActionIs(action)) for action in table.actions]
+        case History.NONE:
+            pass
     return tuple(asked)
 
 
 def encode(
-    table: DemonstrationTable, last_action: bool, rows: slice = slice(None), spare: int = 0
+    table: DemonstrationTable, vocabulary: Vocabulary, rows: slice = slice(None), spare: int = 0
 ) -> Float32Array:
     """The matrix to train on and predict from, shape (rows, columns), of all rows or a stretch.
 
@@ -79,7 +103,9 @@ def encode(
     widths = [
         len(one.categories) if one.kind is FeatureKind.CATEGORICAL else 1 for one in table.features
     ]
-    width = sum(widths) + (len(table.actions) if last_action else 0)
+    history = history_of(table, vocabulary)
+    width = sum(widths) + len(vocabulary.differences)
+    width += 0 if history is None else len(table.actions)
     # Filled in place: large tables are held once.  Column by column, as trees are fitted.
     states = table.states[rows]
     whole = np.zeros((len(states) + spare, max(width, 1)), dtype=np.float32, order="F")
@@ -89,21 +115,41 @@ def encode(
         values = states[:, index]
         start, end = end, end + its
         if feature.kind is FeatureKind.NUMERIC:
-            column = matrix[:, start]
-            column[:] = values
-            column[np.isnan(values)] = MISSING
+            _number(values, matrix[:, start])
         elif feature.kind is FeatureKind.BINARY:
             matrix[:, start] = values == 1
         else:
             _one_hot(values, matrix[:, start:end])
-    if last_action:
-        encode_last(matrix, table.last[rows], len(table.actions))
+    for place, difference in enumerate(vocabulary.differences, start=end):
+        _number(difference_of(table, difference, states), matrix[:, place])
+    if history is not None:
+        encode_history(matrix, history[rows], len(table.actions))
     return whole
 
 
-def encode_last(matrix: Float32Array, last: IntArray, actions: int) -> None:
-    """Writes LAT to a matrix that has it: positions of actions, shape (rows,)."""
-    _one_hot(last, matrix[:, matrix.shape[1] - actions :])
+def history_of(table: DemonstrationTable, vocabulary: Vocabulary) -> IntArray | None:
+    """What was done before each row, as the vocabulary says it, shape (rows,)."""
+    match vocabulary.history:
+        case History.NONE:
+            return None
+        case History.PREVIOUS:
+            return table.previous
+        case History.LAST:
+            return table.last
+
+
+def encode_history(matrix: Float32Array, history: IntArray, actions: int) -> None:
+    """Writes a history to a matrix that has one: positions of actions, shape (rows,)."""
+    _one_hot(history, matrix[:, matrix.shape[1] - actions :])
+
+
+def difference_of(
+    table: DemonstrationTable, difference: Difference, states: FloatArray
+) -> FloatArray:
+    """The values of a difference in some of the table's states, shape (rows,)."""
+    place = {feature.name: index for index, feature in enumerate(table.features)}
+    minuend, subtrahend = place[difference.minuend], place[difference.subtrahend]
+    return np.asarray(states[:, minuend] - states[:, subtrahend])
 
 
 def exact_threshold(threshold: float) -> float:
@@ -126,6 +172,11 @@ def exact_threshold(threshold: float) -> float:
     middle = (float(below) + float(above)) / 2
     tie_goes_down = int(below.view(np.uint32)) % 2 == 0
     return middle if tie_goes_down else float(np.nextafter(middle, -np.inf))
+
+
+def _number(values: FloatArray, column: Float32Array) -> None:
+    column[:] = values
+    column[np.isnan(values)] = MISSING
 
 
 def _one_hot(codes: FloatArray | IntArray, block: Float32Array) -> None:

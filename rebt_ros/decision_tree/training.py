@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -15,11 +15,32 @@ from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree.nodes import Action
-from rebt_ros.decision_tree.encoding import Indicator, Number, columns, encode, encode_last
+from rebt_ros.decision_tree.encoding import (
+    FEATURES_ALONE,
+    Indicator,
+    Number,
+    Vocabulary,
+    columns,
+    difference_of,
+    encode,
+    encode_history,
+)
 from rebt_ros.decision_tree.pruning import PruningPath, pruning_path
+from rebt_ros.decision_tree.readable_thresholds import shared_thresholds
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.decision_tree.upsampling import Upsampled, Upsampling, svm_smote
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import (
+    KNOWN,
+    Difference,
+    HasCategory,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    PreviousActionIs,
+    Threshold,
+)
 
 #: Tables and trees that are in the making at the same time, whatever the number of cores.
 _MOST_AT_A_TIME = 4
@@ -32,17 +53,23 @@ class TrainedTree:
     """A decision tree as data, beside the classifier that it must equal."""
 
     tree: DecisionTree
-    uses_last_action: bool
-    """Whether LAT was among the columns."""
+    vocabulary: Vocabulary
+    """What it may test beside the features."""
     classifier: DecisionTreeClassifier
     """Fitted, not pruned."""
     standing: IntArray
     """The node that decides for each node of the classifier: itself, or what it is pruned to."""
+    thresholds: FloatArray | None = None
+    """What each node of the classifier compares with in double precision, shape (nodes,); None
+    where thresholds are the classifier's own, in single precision."""
     notes: tuple[str, ...] = ()
     """What a person should know about the rows that it was fitted to; no full stops."""
 
     def predict(self, table: DemonstrationTable) -> IntArray:
-        """scikit-learn's own prediction: positions in ``table.actions``, shape (rows,)."""
+        """What it chooses, without going through `tree`: positions in ``table.actions``.
+
+        That is scikit-learn's own prediction, unless thresholds were moved.  Shape (rows,).
+        """
         majority = np.argmax(self.classifier.tree_.value[:, 0, :], axis=1)
         return np.asarray(self.classifier.classes_[majority[self.leaves(table)]], dtype=np.int64)
 
@@ -54,7 +81,11 @@ class TrainedTree:
 
     def leaves(self, table: DemonstrationTable) -> IntArray:
         """The node of the classifier that decides for each row, shape (rows,)."""
-        return np.asarray(self.standing[_reached(self.classifier, table, self.uses_last_action)])
+        if self.thresholds is None:
+            reached = _reached(self.classifier, table, self.vocabulary)
+        else:
+            reached = _compared(self.classifier, table, self.vocabulary, self.thresholds)
+        return np.asarray(self.standing[reached])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,25 +97,62 @@ class FittedTree:
     actions: tuple[Action, ...]
     asked: tuple[Number | Indicator, ...]
     """What each column of the encoded table asks."""
-    uses_last_action: bool
+    vocabulary: Vocabulary
+    """What it may test beside the features."""
     notes: tuple[str, ...] = ()
     """What a person should know about the rows that it was fitted to; no full stops."""
 
     def at(self, ccp_alpha: float) -> TrainedTree:
         """The tree as pruned at `ccp_alpha`; equal to scikit-learn's own fit with it."""
         is_leaf = self.path.leaves_at(ccp_alpha)
+        return self._trained(is_leaf, None)
+
+    def readable_at(self, ccp_alpha: float, table: DemonstrationTable) -> TrainedTree:
+        """The tree as pruned at `ccp_alpha`, with thresholds that are round and shared.
+
+        Each threshold lies in the gap between the rows of its node, so that no row of the table
+        reaches another leaf.
+
+        Args:
+            ccp_alpha: The pruning level.
+            table: What the tree was fitted to, without made-up rows.
+        """
+        is_leaf = self.path.leaves_at(ccp_alpha)
+        exact = self._exact_thresholds()
+        low, high = _gaps(self.classifier, table, self.vocabulary, exact)
+        of_quantity: dict[int, list[int]] = {}
+        for node in np.flatnonzero(~is_leaf & np.isfinite(low) & (exact != KNOWN)).tolist():
+            column = int(self.classifier.tree_.feature[node])
+            if isinstance(self.asked[column], Number):
+                of_quantity.setdefault(column, []).append(node)
+        for split in of_quantity.values():
+            gaps = [(float(low[node]), float(high[node])) for node in split]
+            exact[split] = shared_thresholds(gaps)
+        return self._trained(is_leaf, exact)
+
+    def _trained(self, is_leaf: BoolArray, thresholds: FloatArray | None) -> TrainedTree:
+        root = _as_data(self.classifier, self.asked, self.actions, is_leaf, thresholds)
         return TrainedTree(
-            DecisionTree(
-                self.actions, _as_data(self.classifier, self.asked, self.actions, is_leaf)
-            ),
-            self.uses_last_action,
+            DecisionTree(self.actions, root),
+            self.vocabulary,
             self.classifier,
             self.path.standing(is_leaf),
+            thresholds,
             self.notes,
         )
 
-    def agreements(self, table: DemonstrationTable, ccp_alphas: FloatArray) -> FloatArray:
-        """Share of a table's rows that each pruning level predicts, shape (levels,).
+    def _exact_thresholds(self) -> FloatArray:
+        """What the nodes compare with in double precision, deciding as scikit-learn does."""
+        tree = self.classifier.tree_
+        thresholds = np.array(tree.threshold, dtype=np.float64)
+        for node in np.flatnonzero(tree.children_left >= 0).tolist():
+            match self.asked[tree.feature[node]].at_most(float(thresholds[node])).condition:
+                case Threshold(value=value):
+                    thresholds[node] = value
+        return thresholds
+
+    def hits(self, table: DemonstrationTable, ccp_alphas: FloatArray) -> IntArray:
+        """How many of a table's rows of each action each pruning level predicts.
 
         A node decides at the levels from its own ``collapse`` up to its parent's.  So the rows that
         a level predicts are those that reach its deciding nodes with their majority action, and
@@ -93,9 +161,12 @@ class FittedTree:
         Args:
             table: At least one row, with the actions that the tree was fitted to.
             ccp_alphas: The levels, ascending, shape (levels,).
+
+        Returns:
+            Shape (levels, actions), in the order of the table's actions.
         """
         tree = self.classifier.tree_
-        reached = _reached(self.classifier, table, self.uses_last_action)
+        reached = _reached(self.classifier, table, self.vocabulary)
         actions = len(table.actions)
         counts = np.bincount(reached * actions + table.chosen, minlength=tree.node_count * actions)
         counts = counts.reshape(tree.node_count, actions)
@@ -105,16 +176,16 @@ class FittedTree:
         majority = self.classifier.classes_[np.argmax(tree.value[:, 0, :], axis=1)]
         predicted = counts[np.arange(tree.node_count), majority]
         first, end = self.path.levels_decided(ccp_alphas)
-        change = np.zeros(len(ccp_alphas) + 1)
-        np.add.at(change, first, predicted)
-        np.add.at(change, end, -predicted)
-        return np.asarray(np.cumsum(change)[:-1] / len(table))
+        change = np.zeros((len(ccp_alphas) + 1, actions), dtype=np.int64)
+        np.add.at(change, (first, majority), predicted)
+        np.add.at(change, (end, majority), -predicted)
+        return np.asarray(np.cumsum(change, axis=0)[:-1])
 
 
 def fit(
     table: DemonstrationTable,
     *,
-    last_action: bool,
+    vocabulary: Vocabulary = FEATURES_ALONE,
     max_depth: int | None = None,
     random_state: int = 0,
     upsample: Upsampling = Upsampling.NONE,
@@ -123,7 +194,7 @@ def fit(
 
     Args:
         table: At least one row.
-        last_action: Whether the tree may test LAT.
+        vocabulary: What the tree may test beside the features.
         max_depth: Splits on the longest path; None for no limit.
         random_state: Decides between equally good splits, and which rows are made up.
         upsample: Rows to fit the tree to beside those of the table; its leaves count them, too.
@@ -131,7 +202,7 @@ def fit(
     Raises:
         OptionError: Upsampling needs a package that is not installed.
     """
-    options = _FitOptions(last_action, max_depth, random_state, upsample)
+    options = _FitOptions(vocabulary, max_depth, random_state, upsample)
     with _quiet():
         return _fitted(table, options)
 
@@ -140,7 +211,7 @@ def fit_parts(
     table: DemonstrationTable,
     parts: Sequence[BoolArray],
     *,
-    last_action: bool,
+    vocabulary: Vocabulary = FEATURES_ALONE,
     max_depth: int | None = None,
     random_state: int = 0,
     upsample: Upsampling = Upsampling.NONE,
@@ -150,7 +221,7 @@ def fit_parts(
     Args:
         table: All rows.
         parts: Rows of each part, shape (rows,); as in `DemonstrationTable.where`.
-        last_action: As for `fit`, like all that follow.
+        vocabulary: As for `fit`, like all that follow.
         max_depth: Splits on the longest path.
         random_state: Of each fit.
         upsample: Of each part.
@@ -158,12 +229,12 @@ def fit_parts(
     Yields:
         The tree of the table, then those of the parts.
     """
-    options = _FitOptions(last_action, max_depth, random_state, upsample)
+    options = _FitOptions(vocabulary, max_depth, random_state, upsample)
     if upsample is not Upsampling.NONE:
         # The library that upsampling is done with is not known to stand threads.
-        yield fit(table, **asdict(options))
-        for part in parts:
-            yield fit(table.where(part), **asdict(options))
+        for rows in (np.ones(len(table), dtype=bool), *parts):
+            with _quiet():
+                yield _fitted(table.where(rows), options)
         return
     # Threads are enough: scikit-learn lets go of Python's lock while it grows a tree.
     workers = min(_MOST_AT_A_TIME, os.cpu_count() or 1)
@@ -183,13 +254,14 @@ class _Parts:
     ) -> None:
         self._table, self._parts, self._options = table, parts, options
         # LAT of a part differs where rows before are missing: those rows are appended.
-        changed = [_changed(table, part) if options.last_action else _NO_ROWS for part in parts]
+        with_lat = options.vocabulary.history is History.LAST
+        changed = [_changed(table, part) if with_lat else _NO_ROWS for part in parts]
         again, last = (np.concatenate(one) for one in zip(_NO_ROWS, *changed, strict=True))
-        self._matrix = encode(table, options.last_action, spare=len(again))
+        self._matrix = encode(table, options.vocabulary, spare=len(again))
         if len(again):
             appended = self._matrix[len(table) :]
             appended[:] = self._matrix[again]
-            encode_last(appended, last, len(table.actions))
+            encode_history(appended, last, len(table.actions))
         # Small numbers: scikit-learn sorts them, and copies them more than once.
         kind = np.min_scalar_type(len(table.actions))
         self._chosen = np.append(table.chosen, table.chosen[again]).astype(kind)
@@ -228,7 +300,7 @@ def _changed(table: DemonstrationTable, part: BoolArray) -> _Changed:
 
 @dataclass(frozen=True, slots=True)
 class _FitOptions:
-    last_action: bool
+    vocabulary: Vocabulary
     max_depth: int | None
     random_state: int
     upsample: Upsampling
@@ -251,11 +323,11 @@ def _quiet() -> Iterator[None]:
 
 
 def _fitted(table: DemonstrationTable, options: _FitOptions) -> FittedTree:
-    last_action, random_state = options.last_action, options.random_state
-    matrix, chosen = encode(table, last_action), table.chosen
+    vocabulary, random_state = options.vocabulary, options.random_state
+    matrix, chosen = encode(table, vocabulary), table.chosen
     notes: tuple[str, ...] = ()
     if options.upsample is Upsampling.SVM_SMOTE:
-        more = svm_smote(matrix, chosen, columns(table, last_action), random_state)
+        more = svm_smote(matrix, chosen, columns(table, vocabulary), random_state)
         notes = tuple(_notes(table, more))
         matrix, chosen = more.matrix, more.chosen
     classifier = options.classifier()
@@ -274,8 +346,8 @@ def _as_fitted(
         classifier,
         pruning_path(classifier),
         actions,
-        columns(table, options.last_action),
-        options.last_action,
+        columns(table, options.vocabulary),
+        options.vocabulary,
         notes,
     )
 
@@ -283,7 +355,7 @@ def _as_fitted(
 def train(
     table: DemonstrationTable,
     *,
-    last_action: bool,
+    vocabulary: Vocabulary = FEATURES_ALONE,
     max_depth: int | None = None,
     ccp_alpha: float = 0.0,
     random_state: int = 0,
@@ -292,7 +364,7 @@ def train(
     """Fits a decision tree and prunes it at `ccp_alpha`; see `fit`."""
     fitted = fit(
         table,
-        last_action=last_action,
+        vocabulary=vocabulary,
         max_depth=max_depth,
         random_state=random_state,
         upsample=upsample,
@@ -301,15 +373,101 @@ def train(
 
 
 def _reached(
-    classifier: DecisionTreeClassifier, table: DemonstrationTable, last_action: bool
+    classifier: DecisionTreeClassifier, table: DemonstrationTable, vocabulary: Vocabulary
 ) -> IntArray:
     """The leaf of the classifier that each row reaches, shape (rows,)."""
     reached = np.empty(len(table), dtype=np.int64)
     # In parts, so that a large table is not held a second time.
     for start in range(0, len(table), _ROWS_AT_A_TIME):
         rows = slice(start, start + _ROWS_AT_A_TIME)
-        reached[rows] = classifier.apply(encode(table, last_action, rows))
+        reached[rows] = classifier.apply(encode(table, vocabulary, rows))
     return reached
+
+
+def _compared(
+    classifier: DecisionTreeClassifier,
+    table: DemonstrationTable,
+    vocabulary: Vocabulary,
+    thresholds: FloatArray,
+) -> IntArray:
+    """The leaf that each row reaches with thresholds in double precision, shape (rows,)."""
+    tree, values = classifier.tree_, _Values(classifier, table, vocabulary)
+    node = np.zeros(len(table), dtype=np.int64)
+    under_way = np.arange(len(table))
+    while (under_way := under_way[tree.children_left[node[under_way]] >= 0]).size:
+        at = node[under_way]
+        left = values.of(under_way, tree.feature[at]) <= thresholds[at]
+        node[under_way] = np.where(left, tree.children_left[at], tree.children_right[at])
+    return node
+
+
+def _gaps(
+    classifier: DecisionTreeClassifier,
+    table: DemonstrationTable,
+    vocabulary: Vocabulary,
+    thresholds: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """The largest known value that goes left at each split, and the smallest that goes right.
+
+    Returns:
+        Two of shape (nodes,): -inf and inf where there is none.
+    """
+    tree, values = classifier.tree_, _Values(classifier, table, vocabulary)
+    low, high = np.full(tree.node_count, -np.inf), np.full(tree.node_count, np.inf)
+    node = np.zeros(len(table), dtype=np.int64)
+    under_way = np.arange(len(table))
+    while (under_way := under_way[tree.children_left[node[under_way]] >= 0]).size:
+        at = node[under_way]
+        value = values.of(under_way, tree.feature[at])
+        left = value <= thresholds[at]
+        np.maximum.at(low, at[left], value[left])
+        np.minimum.at(high, at[~left], value[~left])
+        node[under_way] = np.where(left, tree.children_left[at], tree.children_right[at])
+    return low, high
+
+
+class _Values:
+    """What a classifier's columns hold in double precision; infinite where it is missing."""
+
+    def __init__(
+        self, classifier: DecisionTreeClassifier, table: DemonstrationTable, vocabulary: Vocabulary
+    ) -> None:
+        self._columns = {}
+        for place, asked in enumerate(columns(table, vocabulary)):
+            if place in classifier.tree_.feature:
+                values = _asked(asked, table, vocabulary)
+                self._columns[place] = np.where(np.isnan(values), np.inf, values)
+
+    def of(self, rows: IntArray, column: IntArray) -> FloatArray:
+        """The value of one column in each of the rows, shape (rows,)."""
+        values = np.empty(len(rows))
+        for place, its in self._columns.items():
+            here = column == place
+            values[here] = its[rows[here]]
+        return values
+
+
+def _asked(
+    asked: Number | Indicator, table: DemonstrationTable, vocabulary: Vocabulary
+) -> FloatArray:
+    place = {feature.name: index for index, feature in enumerate(table.features)}
+    match asked:
+        case Number(quantity=Difference() as difference):
+            return difference_of(table, difference, table.states)
+        case Number(quantity=str(name)):
+            return table.states[:, place[name]]
+        case Indicator(condition=IsTrue(feature=name)):
+            holds = table.states[:, place[name]] == 1
+        case Indicator(condition=HasCategory(feature=name, category=category)):
+            code = table.features[place[name]].categories.index(category)
+            holds = table.states[:, place[name]] == code
+        case Indicator(condition=PreviousActionIs(action=action)):
+            holds = table.previous == table.actions.index(action)
+        case Indicator(condition=LastActionIs(action=action)):
+            holds = table.last == table.actions.index(action)
+        case _:
+            raise AssertionError(asked)
+    return np.asarray(holds, dtype=np.float64)
 
 
 def _notes(table: DemonstrationTable, more: Upsampled) -> Iterator[str]:
@@ -325,6 +483,7 @@ def _as_data(
     asked: tuple[Number | Indicator, ...],
     actions: tuple[Action, ...],
     is_leaf: BoolArray,
+    thresholds: FloatArray | None,
 ) -> DecisionNode:
     fitted = classifier.tree_
     distributions = _distributions(classifier, len(actions))
@@ -335,7 +494,11 @@ def _as_data(
             data[node] = Leaf(tuple(distributions[node].tolist()))
             continue
         left, right = int(fitted.children_left[node]), int(fitted.children_right[node])
-        literal = asked[fitted.feature[node]].at_most(float(fitted.threshold[node]))
+        column = asked[fitted.feature[node]]
+        if isinstance(column, Number) and thresholds is not None:
+            literal = Literal(Threshold(column.quantity, float(thresholds[node])))
+        else:
+            literal = column.at_most(float(fitted.threshold[node]))
         holds, fails = (left, right) if literal.positive else (right, left)
         data[node] = Split(literal.condition, data[holds], data[fails])
     return data[0]

@@ -25,7 +25,7 @@ import numpy as np
 from rebt_ros.arrays import Float32Array, FloatArray, IntArray
 from rebt_ros.decision_tree.encoding import MISSING, Indicator, Number
 from rebt_ros.errors import OptionError
-from rebt_ros.logic.conditions import Condition, LastActionIs
+from rebt_ros.logic.conditions import Condition, LastActionIs, PreviousActionIs, features_of
 
 #: Neighbours of the same action that a row is made up with, and of any action that say whether a
 #: row is noise; fewer where there are fewer rows (SVM-SMOTE's defaults).
@@ -163,7 +163,7 @@ def _made_up(
 
 
 def _with_whole_indicators(rows: Float32Array, asked: Sequence[Number | Indicator]) -> Float32Array:
-    """The rows with one truth value, at most one category per feature and at most one LAT."""
+    """The rows with one truth value, at most one category per feature and one action before."""
     groups: dict[str | None, list[int]] = {}
     for column, one in enumerate(asked):
         if isinstance(one, Indicator):
@@ -171,7 +171,7 @@ def _with_whole_indicators(rows: Float32Array, asked: Sequence[Number | Indicato
     whole = rows.copy()
     for columns in groups.values():
         shares = rows[:, columns]
-        # None of them is a value of its own: false, or missing, or no LAT.
+        # None of them is a value of its own: false, or missing, or nothing done before.
         none = 1 - shares.sum(axis=1, keepdims=True)
         nearest = np.argmax(np.hstack([shares, none]), axis=1)
         whole[:, columns] = np.equal(nearest[:, np.newaxis], np.arange(len(columns)))
@@ -179,5 +179,9 @@ def _with_whole_indicators(rows: Float32Array, asked: Sequence[Number | Indicato
 
 
 def _feature(condition: Condition) -> str | None:
-    """What a condition asks about; None for LAT."""
-    return None if isinstance(condition, LastActionIs) else condition.feature
+    """The feature that an indicator asks about; None for what was done before."""
+    return (
+        None
+        if isinstance(condition, PreviousActionIs | LastActionIs)
+        else features_of(condition)[0]
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +17,17 @@ from rebt_ros.demonstration.schema import Feature
 DEFAULT_CHANNEL = "action"
 
 
+class RowKind(Enum):
+    """What a row stands for, and so what was done "before" it."""
+
+    EVENT = "event"
+    """One action, from its beginning to its end; before it is the action that ended last."""
+    SAMPLE = "sample"
+    """One instant of an action that is held; before it is what was done an instant earlier."""
+
+
 class Row(NamedTuple):
-    """One action event with the state that held at that moment."""
+    """An action with the state that held at that moment."""
 
     stamp: int
     """Nanoseconds."""
@@ -54,7 +64,9 @@ class Demonstration:
     """Position in `channels` of each row's channel, shape (rows,)."""
     before: Mapping[str, str] = field(default_factory=dict)
     """LAT of the first row of a channel, where something was done before that was not recorded:
-    a correction begins amid what the robot did by itself."""
+    a correction begins amid what the robot did by itself.  It is not the previous action, of which
+    a first row has none."""
+    row_kind: RowKind = RowKind.EVENT
 
     def __post_init__(self) -> None:
         rows = len(self.chosen)
@@ -73,7 +85,11 @@ class Demonstration:
 
     @classmethod
     def from_rows(
-        cls, name: str, features: tuple[Feature, ...], rows: Iterable[Row]
+        cls,
+        name: str,
+        features: tuple[Feature, ...],
+        rows: Iterable[Row],
+        row_kind: RowKind = RowKind.EVENT,
     ) -> Demonstration:
         """Gathers rows into columns, without keeping them."""
         stamps, values = array("q"), array("d")
@@ -91,6 +107,7 @@ class Demonstration:
             np.frombuffer(stamps, dtype=np.int64),
             *actions.sorted(),
             *channels.sorted(),
+            row_kind=row_kind,
         )
 
 

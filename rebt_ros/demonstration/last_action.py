@@ -1,8 +1,15 @@
-"""The last action taken (LAT): the most recent action that differs from row t's (paper, III-B)."""
+"""What was done before row t, which a tree may test.
+
+previous action
+    The action of the row before; none in the first row of a demonstration.
+last action taken (LAT)
+    The most recent action that differs from row t's (paper, III-B).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from enum import Enum
 
 import numpy as np
 
@@ -12,21 +19,40 @@ from rebt_ros.arrays import IntArray
 NO_ACTION = -1
 
 
+class History(Enum):
+    """What a tree may test of what was done before."""
+
+    NONE = "none"
+    PREVIOUS = "previous"
+    """The previous action."""
+    LAST = "last"
+    """LAT, as in the paper."""
+
+
 class ActionHistory:
-    """The distinct actions taken so far on one channel, most recent first.
+    """What was done so far on one channel.
 
     >>> history = ActionHistory(["turn", "go", "go"])
+    >>> history.previous
+    'go'
     >>> history.before("go"), history.before("turn"), history.before("stop")
     ('turn', 'go', 'go')
     """
 
     def __init__(self, actions: Iterable[str] = ()) -> None:
         self._recent: list[str] = []
+        self.previous: str | None = None
+        """The previous action; None where nothing is known to have been done."""
         for action in actions:
             self.take(action)
 
     def take(self, action: str) -> None:
-        """Notes that `action` was taken now."""
+        """Notes that `action` was taken, and that the next decision comes after it."""
+        self.previous = action
+        self.begin(action)
+
+    def begin(self, action: str) -> None:
+        """Notes that `action` has begun: it is in LAT, but not yet the previous action."""
         if self._recent and self._recent[0] == action:
             return
         if action in self._recent:
@@ -45,6 +71,26 @@ class ActionHistory:
     def clear(self) -> None:
         """Forgets everything, as at the start of a demonstration."""
         self._recent.clear()
+        self.previous = None
+
+
+def previous_actions(actions: IntArray, demonstrations: IntArray) -> IntArray:
+    """The previous action of every row of one channel.
+
+    Args:
+        actions: Action codes in the order in which they were taken, shape (rows,).
+        demonstrations: Number of each row's demonstration, shape (rows,); its rows stand together.
+
+    Returns:
+        Codes, shape (rows,); `NO_ACTION` in the first row of each demonstration.
+
+    >>> previous_actions(np.array([0, 0, 1, 2]), np.array([0, 0, 0, 1])).tolist()
+    [-1, 0, 0, -1]
+    """
+    previous = np.full(len(actions), NO_ACTION, dtype=np.int64)
+    inside = demonstrations[1:] == demonstrations[:-1]
+    previous[1:][inside] = actions[:-1][inside]
+    return previous
 
 
 def last_actions(

@@ -1,4 +1,4 @@
-"""The table that is learned from: the rows of all demonstrations of one channel, with LAT."""
+"""The table that is learned from: all rows of one channel, with what was done before each."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
-from rebt_ros.demonstration.demonstration import Demonstration
-from rebt_ros.demonstration.last_action import NO_ACTION, last_actions
+from rebt_ros.demonstration.demonstration import Demonstration, RowKind
+from rebt_ros.demonstration.last_action import NO_ACTION, last_actions, previous_actions
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError, OptionError
 
@@ -43,8 +43,15 @@ class DemonstrationTable:
     """Position in `actions` of each row's LAT, `NO_ACTION` where there is none, shape (rows,)."""
     before: IntArray | None = None
     """LAT of each demonstration's first row, as in `last`, shape (demonstrations,); None: none."""
+    previous: IntArray = None  # type: ignore[assignment]
+    """Position in `actions` of the action of the row before, `NO_ACTION` in a demonstration's first
+    row, shape (rows,); None to derive it from `chosen`."""
+    row_kind: RowKind = RowKind.EVENT
 
     def __post_init__(self) -> None:
+        if self.previous is None:
+            previous = previous_actions(self.chosen, self.demonstration)
+            object.__setattr__(self, "previous", previous)
         last = last_actions(self.chosen, self.demonstration, self.before)
         object.__setattr__(self, "last", last)
 
@@ -54,7 +61,8 @@ class DemonstrationTable:
     def where(self, rows: BoolArray) -> DemonstrationTable:
         """The table of some rows only.
 
-        LAT is derived anew: a part that begins inside a demonstration begins without one.
+        The previous action is that of the whole table.  LAT is derived anew: a part that begins
+        inside a demonstration begins without one.
         """
         # Rows that stand together are not copied: tables can be large.
         part = _stretch(rows)
@@ -65,6 +73,7 @@ class DemonstrationTable:
             demonstration=self.demonstration[part],
             stamps=self.stamps[part],
             before=self._before_parts(rows),
+            previous=self.previous[part],
         )
 
     def last_where(self, rows: BoolArray) -> IntArray:
@@ -86,15 +95,18 @@ class DemonstrationTable:
         there are several, so that no row is tested whose neighbours were learned from.
 
         Args:
-            fraction: Share to hold out, in [0, 1); at least one row, or demonstration, if above 0.
+            fraction: Share of the rows to hold out, in [0, 1), as nearly as whole demonstrations
+                allow; at least one row, or demonstration, if above 0.
         """
         shown = np.unique(self.demonstration)
         if fraction == 0 or len(self) < 2:
             return np.zeros(len(self), dtype=bool)
         if len(shown) == 1:
             return np.arange(len(self)) >= _share_kept(len(self), fraction)
-        first = int(shown[_share_kept(len(shown), fraction)])
-        return np.greater_equal(self.demonstration, first)
+        # Where each demonstration but the first begins, from the last one back.
+        begins = np.searchsorted(self.demonstration, shown[:0:-1])
+        nearest = np.argmin(np.abs(len(self) - begins - fraction * len(self)))
+        return np.arange(len(self)) >= int(begins[nearest])
 
 
 def _stretch(rows: BoolArray) -> BoolArray | slice:
@@ -121,7 +133,7 @@ def tabulate(
             0 and 1, and both of them, is binary; otherwise it stays what it is.
 
     Raises:
-        InputError: No rows, or demonstrations whose features differ.
+        InputError: No rows, or demonstrations whose features or kinds of rows differ.
         OptionError: A declared feature does not exist or does not hold such values.
     """
     demonstrations = [one for one in demonstrations if len(one)]
@@ -132,7 +144,23 @@ def tabulate(
     features, states = _joined_states(demonstrations)
     features, states = _with_kinds(features, states, declared or {})
     channels = sorted({channel for one in demonstrations for channel in one.channels})
-    return tuple(_channel_table(channel, demonstrations, features, states) for channel in channels)
+    row_kind = _common_row_kind(demonstrations)
+    return tuple(
+        replace(_channel_table(channel, demonstrations, features, states), row_kind=row_kind)
+        for channel in channels
+    )
+
+
+def _common_row_kind(demonstrations: Sequence[Demonstration]) -> RowKind:
+    first = demonstrations[0]
+    for other in demonstrations[1:]:
+        if other.row_kind is not first.row_kind:
+            raise InputError(
+                f"the rows of {first.name} are {first.row_kind.value}s and those of {other.name} "
+                f"are {other.row_kind.value}s, so that what was done before a row means different "
+                "things: record all with the same sample_rate, or none."
+            )
+    return first.row_kind
 
 
 def _channel_table(

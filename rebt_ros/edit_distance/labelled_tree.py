@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.logic.conditions import LastActionIs
+from rebt_ros.logic.conditions import LastActionIs, PreviousActionIs, features_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +70,8 @@ def _preorder(node: nodes.Node, parent: int, place: int) -> Iterator[tuple[str, 
         case nodes.Action(label=label):
             yield f"Action {label}", parent
         case nodes.Condition(literal=literal):
-            if not isinstance(literal.condition, LastActionIs):
-                yield f"Condition {literal.condition.feature}", parent
+            if not isinstance(literal.condition, PreviousActionIs | LastActionIs):
+                yield f"Condition {' - '.join(features_of(literal.condition))}", parent
         case _:
             below: list[tuple[str, int]] = []
             for child in node.children:

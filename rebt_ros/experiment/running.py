@@ -9,7 +9,9 @@ from random import Random
 
 from rebt_ros.algorithms.lat_trees import Demonstrated
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import TrainedTree, fit
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.edit_distance.labelled_tree import labelled
 from rebt_ros.edit_distance.networkx_measure import NetworkxMeasure
@@ -105,7 +107,7 @@ def _levels(table: DemonstrationTable) -> dict[Mode, list[_Level]]:
     made: dict[Mode, list[_Level]] = {mode: [] for mode in Mode}
     if len(table.actions) < 2:
         return made
-    fitted = fit(table, last_action=True, max_depth=MAX_DEPTH)
+    fitted = fit(table, vocabulary=Vocabulary(History.LAST), max_depth=MAX_DEPTH)
     routines = routines_of(table, DEFAULTS)
     demonstrated = demonstrated_in(table)
     for ccp_alpha in fitted.path.alphas.tolist():

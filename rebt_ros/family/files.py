@@ -169,7 +169,8 @@ def _entry(name: str, level: Level) -> dict[str, Any]:
         "fidelity_mismatches": figures.fidelity_mismatches,
         "teacher_forced_agreement": figures.teacher_forced_agreement,
         "own_history_agreement": figures.own_history_agreement,
-        "cross_validated_agreement": judged.mean if judged else None,
+        "cross_validated_mean_recall": judged.recall if judged else None,
+        "cross_validated_agreement": judged.agreement if judged else None,
         "cross_validated_standard_error": judged.standard_error if judged else None,
         "all_reductions": level.reduced,
         "best": level.best,
@@ -184,8 +185,6 @@ def _selection_notes(family: Family, numbers: tuple[int, ...]) -> Iterator[str]:
             f"{len(numbers)} of {count} pruning levels were written, evenly spread, and "
             f"{count - len(numbers)} left out; --most-levels {count} writes all"
         )
-    if family.options.refit:
-        yield "the levels are those of the tree before it was learned again from all rows"
 
 
 def _write_plot(directory: Path, family: Family) -> list[str]:

@@ -1,7 +1,7 @@
-"""Every pruning level as a learned tree of its own.
+"""Every pruning level of the published tree as a learned tree of its own.
 
-The levels are those of the decision tree that was fitted to the rows which were not held out, so
-each is judged on rows that it was not learned from, also where the published tree was refitted.
+Its figures come from the same level of the tree that was fitted to the rows which were not held
+out, so that each is judged on rows that it was not learned from.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rebt_ros.decision_tree.shown_rows import shown_rows
 from rebt_ros.decision_tree.tree import DecisionTree
 from rebt_ros.errors import OptionError
 from rebt_ros.options import LearnOptions
-from rebt_ros.pipeline import Learning, as_learned, figures_of
+from rebt_ros.pipeline import Learning, as_learned, figures_of, mismatches, pruned
 from rebt_ros.suggesting import accept
 
 #: The first, the last, the best and the chosen level are always among them.
@@ -27,10 +27,13 @@ FEWEST_LEVELS = 4
 
 @dataclass(frozen=True, slots=True)
 class CrossValidated:
-    """Own-history agreement of a level in cross-validation."""
+    """How well a level does in cross-validation."""
 
-    mean: float
+    recall: float
+    """Mean over the actions."""
+    agreement: float
     standard_error: float
+    """Of the agreement."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -100,14 +103,23 @@ class Family:
     def level(self, number: int) -> Level:
         """Makes the trees of a level."""
         learning, ccp_alpha = self.learning, float(self.ccp_alphas[number])
-        trained = learning.policy.fitted.at(ccp_alpha)
+        table = learning.table if self.options.refit else learning.table.where(~learning.held_out)
+        trained = pruned(learning.policy.fitted, ccp_alpha, table, self.options)
         leaves, chosen = int(self.leaves[number]), number == self.chosen
         # Suggestions belong to the published tree.
         whole = convert(trained, self.options, psa=learning.policy.psa)
         tree, _ = accept(whole, (), replace(self.options, attach=()))
-        figures = figures_of(learning.table, learning.held_out, trained, tree)
-        learned = as_learned(learning.table, trained, tree, ccp_alpha, figures, self.options)
-        ranges = shown_rows(learning.table.where(~learning.held_out), trained)
+        figures = replace(
+            figures_of(
+                learning.table.where(learning.held_out),
+                learning.judge.at(ccp_alpha),
+                self.options,
+                learning.policy.psa,
+            ),
+            fidelity_mismatches=mismatches(learning.table, trained, tree),
+        )
+        learned = as_learned(table, trained, tree, ccp_alpha, figures, self.options)
+        ranges = shown_rows(table, trained)
         return Level(
             number,
             ccp_alpha,
@@ -125,8 +137,8 @@ class Family:
         if judged is None:
             return None
         for place in np.flatnonzero(judged.ccp_alphas == ccp_alpha):
-            mean, error = judged.means[place], judged.standard_errors[place]
-            return CrossValidated(float(mean), float(error))
+            figures = (judged.mean_recalls, judged.means, judged.standard_errors)
+            return CrossValidated(*(float(one[place]) for one in figures))
         return None
 
 

@@ -1,7 +1,8 @@
 """What conditions say about each other: combinations that no state has.
 
 Espresso minimizes over free variables.  Conditions are not free: of two thresholds the lower one
-implies the higher one, and a feature has at most one category, as LAT is at most one action.
+implies the higher one, and a feature has at most one category, as the previous action and LAT are
+at most one action.
 Handed to espresso as don't-cares, the infeasible combinations make smaller rules that are the same
 in every state.
 """
@@ -18,6 +19,8 @@ from rebt_ros.logic.conditions import (
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
+    Quantity,
     Threshold,
 )
 from rebt_ros.logic.dnf import Conjunction, Dnf
@@ -52,9 +55,13 @@ def _subject(condition: Condition) -> Hashable:
     """What a condition is about; conditions about different things say nothing of each other."""
     match condition:
         case LastActionIs(deciding=deciding):
-            return deciding
-        case _:
-            return type(condition), condition.feature
+            return LastActionIs, deciding
+        case PreviousActionIs():
+            return PreviousActionIs
+        case Threshold(quantity=quantity) | Interval(quantity=quantity):
+            return type(condition), quantity
+        case IsTrue(feature=feature) | HasCategory(feature=feature):
+            return type(condition), feature
 
 
 def _implied(
@@ -69,10 +76,10 @@ def _implied(
                     other.value > value if literal.positive else other.value < value
                 ):
                     yield Literal(other, literal.positive)
-        case HasCategory() | LastActionIs():
+        case HasCategory() | PreviousActionIs() | LastActionIs():
             if literal.positive:
                 yield from (~Literal(other) for other in others if other != condition)
-        case IsTrue():
+        case IsTrue() | Interval():
             pass
 
 
@@ -85,16 +92,14 @@ def infeasible(conditions: Iterable[Condition]) -> Dnf:
     ... )
     True
     """
-    thresholds: dict[str, set[Threshold]] = {}
+    thresholds: dict[Quantity, set[Threshold]] = {}
     exclusive: dict[Hashable, list[Condition]] = {}
     for condition in dict.fromkeys(conditions):
         match condition:
-            case Threshold(feature=feature):
-                thresholds.setdefault(feature, set()).add(condition)
-            case HasCategory(feature=feature):
-                exclusive.setdefault(feature, []).append(condition)
-            case LastActionIs(deciding=deciding):
-                exclusive.setdefault(deciding, []).append(condition)
+            case Threshold(quantity=quantity):
+                thresholds.setdefault(quantity, set()).add(condition)
+            case HasCategory() | PreviousActionIs() | LastActionIs():
+                exclusive.setdefault(_subject(condition), []).append(condition)
             case IsTrue() | Interval():
                 # Nothing is said of intervals, which are made of rules that are minimized already.
                 pass

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from rebt_ros.logic.conditions import Condition, Literal, Threshold
+from rebt_ros.logic.conditions import Condition, Literal, Quantity, Threshold
 from rebt_ros.logic.dnf import Dnf, conditions_of
 from rebt_ros.logic.numbered import Codes, Numbering, mask
 
@@ -24,7 +24,7 @@ def implies(stronger: Literal, weaker: Literal) -> bool:
     if (
         isinstance(a, Threshold)
         and isinstance(b, Threshold)
-        and a.feature == b.feature
+        and a.quantity == b.quantity
         and stronger.positive == weaker.positive
     ):
         return a.value <= b.value if stronger.positive else a.value >= b.value
@@ -46,11 +46,11 @@ def float_reduction(dnf: Dnf) -> Dnf:
 def implied_literals(conditions: Sequence[Condition]) -> list[int]:
     """For each code, the mask of what it implies as in `implies`, itself included."""
     implied = [1 << code for code in range(2 * len(conditions))]
-    of_feature: dict[str, list[tuple[float, int]]] = {}
+    of_quantity: dict[Quantity, list[tuple[float, int]]] = {}
     for position, condition in enumerate(conditions):
         if isinstance(condition, Threshold):
-            of_feature.setdefault(condition.feature, []).append((condition.value, position))
-    for thresholds in of_feature.values():
+            of_quantity.setdefault(condition.quantity, []).append((condition.value, position))
+    for thresholds in of_quantity.values():
         # A positive literal implies those of higher thresholds, a negative one of lower ones.
         for positive, ordered in ((1, sorted(thresholds, reverse=True)), (0, sorted(thresholds))):
             weaker = 0

@@ -1,4 +1,4 @@
-"""Two thresholds on one feature as one interval, as a person writes it.
+"""Two thresholds on one quantity as one interval, as a person writes it.
 
 Not ``x <= 0.3`` and ``x <= 0.5`` is ``0.3 < x <= 0.5``.  Both are false where x is missing, so that
 the truth value is unchanged in every state.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import permutations
 
-from rebt_ros.logic.conditions import KNOWN, Condition, Interval, Literal, Threshold
+from rebt_ros.logic.conditions import KNOWN, Condition, Interval, Literal, Quantity, Threshold
 from rebt_ros.logic.factoring import Factored
 from rebt_ros.logic.numbered import Codes, mask
 
@@ -30,7 +30,7 @@ def merged(conjunction: Iterable[Literal]) -> tuple[Literal, ...]:
 
     >>> near, reachable = Literal(Threshold("x", 0.3)), Literal(Threshold("x", 0.5))
     >>> merged((reachable, ~near))
-    (Literal(condition=Interval(feature='x', above=0.3, at_most=0.5), positive=True),)
+    (Literal(condition=Interval(quantity='x', above=0.3, at_most=0.5), positive=True),)
     >>> merged((near, ~reachable)) == (near, ~reachable)
     True
     """
@@ -49,11 +49,11 @@ def merged(conjunction: Iterable[Literal]) -> tuple[Literal, ...]:
 def enclosing_literals(conditions: Sequence[Condition]) -> list[int]:
     """For each code, the mask of the literals with which it is an interval; none but for ``>``."""
     enclosing = [0] * (2 * len(conditions))
-    of_feature: dict[str, list[int]] = {}
+    of_quantity: dict[Quantity, list[int]] = {}
     for place, condition in enumerate(conditions):
         if isinstance(condition, Threshold):
-            of_feature.setdefault(condition.feature, []).append(place)
-    for places in of_feature.values():
+            of_quantity.setdefault(condition.quantity, []).append(place)
+    for places in of_quantity.values():
         for lower, upper in permutations(places, 2):
             if _interval(~Literal(conditions[lower]), Literal(conditions[upper])) is not None:
                 enclosing[2 * lower] |= 1 << (2 * upper + 1)
@@ -76,10 +76,10 @@ def _interval(one: Literal, other: Literal) -> Interval | None:
     lower, upper = (one, other) if other.positive else (other, one)
     match lower, upper:
         case (
-            Literal(condition=Threshold(feature=feature, value=above), positive=False),
-            Literal(condition=Threshold(feature=same, value=at_most), positive=True),
-        ) if feature == same and above < at_most and at_most != KNOWN:
+            Literal(condition=Threshold(quantity=quantity, value=above), positive=False),
+            Literal(condition=Threshold(quantity=same, value=at_most), positive=True),
+        ) if quantity == same and above < at_most and at_most != KNOWN:
             # "x > 0.3" and "x is known" read better than an interval up to the largest number.
-            return Interval(feature, above, at_most)
+            return Interval(quantity, above, at_most)
         case _:
             return None

@@ -289,6 +289,9 @@ class ExecutorNode(Node):
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if request.data:
+            if not self._enabled:
+                # Nothing was done before it, as in a demonstration's first row.
+                self._forget_history()
             self._enabled = True
             self._guard.release()
         else:
@@ -298,6 +301,10 @@ class ExecutorNode(Node):
         response.message = f"enabled: {self._condition()}." if self._enabled else "disabled."
         self.get_logger().info(response.message)
         return response
+
+    def _forget_history(self) -> None:
+        for history in self._histories.values():
+            history.clear()
 
     def _disable(self) -> None:
         # A person who drives goes on to do so.
@@ -340,7 +347,8 @@ class ExecutorNode(Node):
         if self._moving and self._settings.halt_action:
             self._channels.send_to_all(self._settings.halt_action)
             for history in self._histories.values():
-                history.take(self._settings.halt_action)
+                # LAT knows of it.  The previous action stays: the tree goes on with what it did.
+                history.begin(self._settings.halt_action)
         self._moving = False
 
     def _interrupt(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
@@ -65,6 +65,7 @@ class LearnerNode(Node):
         self._call: _Call | None = None
         self._last = Report(Level.OK, "idle: nothing was learned yet")
         self._learned: LearnedTree | None = None
+        self._figures: Mapping[str, str] = {}
         self._settings = declare_settings(self)
         self._publisher = self.create_publisher(String, "behavior_tree", TREE_QOS)
         self._publish_what_is_on_disk()
@@ -155,6 +156,7 @@ class LearnerNode(Node):
                 raise LearningCancelledError
             call.progress = _PUBLISHING
         write_text_atomically(path, lesson.document)
+        self._figures = lesson.figures
         self._publish(learned, lesson.document)
         return f"{lesson.sentence} It is published and in {path}.{_in_short(lesson.notes)}"
 
@@ -210,7 +212,10 @@ class LearnerNode(Node):
                 "rows": provenance.rows,
                 "demonstrations": provenance.demonstrations,
                 "own-history agreement": provenance.figures.own_history_agreement,
+                "mean recall of held-out rows": provenance.figures.mean_recall,
+                "history": provenance.history.value,
             }
+            values |= self._figures
         call = self._call
         if call is not None:
             progress = call.progress

@@ -11,6 +11,7 @@ from rclpy.node import Node
 
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import LARGEST_LAG
 from rebt_ros.ros.learning_process import Request
 from rebt_ros.ros.parameters import Parameters
@@ -106,6 +107,14 @@ def _pruning(declare: Parameters) -> dict[str, Callable[[], object]]:
 
 def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
     """What stands in the tree."""
+    history = declare.text(
+        "history",
+        "auto",
+        "What the tree may test of what was done before: previous (action), last (action taken, as "
+        "in the paper) or none; auto: the previous action where that raises mean recall.",
+        choices=("auto", *(kind.value for kind in History)),
+        fixed=False,
+    )
     return {
         "delta": declare.number(
             "delta",
@@ -118,7 +127,7 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
         "psa": declare.text(
             "psa",
             "auto",
-            "Whether PSA nodes stand in the tree; auto: where they do no harm.",
+            "Whether PSA nodes stand in the tree; auto: where they raise agreement.",
             choices=_USES,
             fixed=False,
         ),
@@ -129,11 +138,19 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
             choices=[root.value for root in Root],
             fixed=False,
         ),
-        "last_action": declare.text(
-            "last_action",
+        "history": lambda: None if (asked := history()) == "auto" else asked,
+        "differences": declare.text(
+            "differences",
             "auto",
-            "Whether the tree may test the last action taken; auto: where it does no harm.",
+            "Whether the tree may compare two features, as in left < right; auto: where that makes "
+            "it a quarter smaller at the same agreement.",
             choices=_USES,
+            fixed=False,
+        ),
+        "readable_thresholds": declare.flag(
+            "readable_thresholds",
+            True,
+            "Whether thresholds are moved to round values within the gaps between rows.",
             fixed=False,
         ),
     }
@@ -141,7 +158,17 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
 
 def _rows(declare: Parameters) -> dict[str, Callable[[], object]]:
     """What rows it is learned from, and judged on."""
+    reaction_time = declare.number(
+        "reaction_time",
+        -1.0,
+        "How late the demonstrator acted, to be undone before learning (seconds); -1.0 to read it "
+        "off demonstrations that were recorded with a sample rate.",
+        -1.0,
+        5.0,
+        fixed=False,
+    )
     return {
+        "reaction_time": lambda: None if (late := reaction_time()) < 0 else late,
         "test_fraction": declare.number(
             "test_fraction", 0.25, "Share to hold out for judging.", 0.0, 0.9, fixed=False
         ),

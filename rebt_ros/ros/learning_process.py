@@ -15,7 +15,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -58,6 +58,8 @@ class Lesson:
     """What was learned, for people."""
     notes: Sequence[str] = ()
     """What a person should know about the recordings and about the tree; no full stops."""
+    figures: Mapping[str, str] = field(default_factory=dict)
+    """How well it may do, for /diagnostics."""
 
 
 class LearningError(RebtError):

@@ -119,6 +119,7 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
     from rebt_ros.behavior_tree.document import dumps
     from rebt_ros.behavior_tree.learned_tree import Root
     from rebt_ros.decision_tree.upsampling import Upsampling
+    from rebt_ros.demonstration.last_action import History
     from rebt_ros.demonstration.schema import FeatureKind
     from rebt_ros.demonstration.table import tabulate
     from rebt_ros.options import LearnOptions, Use
@@ -134,11 +135,12 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
     kinds: dict[str, type[Enum]] = {
         "root": Root,
         "psa": Use,
-        "last_action": Use,
+        "history": History,
+        "differences": Use,
         "upsample": Upsampling,
     }
     chosen: dict[str, Any] = {
-        name: kinds[name](value) if name in kinds else value
+        name: kinds[name](value) if name in kinds and value is not None else value
         for name, value in request.options.items()
     }
     options = LearnOptions(**chosen)
@@ -156,7 +158,21 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
     learned = pipeline.side_by_side(learnings)
     notes = [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
     notes += [note for learning in learnings for note in learning.notes]
-    return Lesson(dumps(learned), pipeline.summary_sentence(learned), notes)
+    led = {
+        f"{learning.table.channel}: " if len(learnings) > 1 else "": learning.report
+        for learning in learnings
+    }
+    sentences = [f"{channel}{one.in_short()}" for channel, one in led.items() if one.in_short()]
+    return Lesson(
+        dumps(learned),
+        " ".join((pipeline.summary_sentence(learned), *sentences)),
+        notes,
+        {
+            f"{channel}{name}": value
+            for channel, one in led.items()
+            for name, value in one.figures().items()
+        },
+    )
 
 
 if __name__ == "__main__":

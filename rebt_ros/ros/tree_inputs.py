@@ -11,7 +11,6 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import StateEncoder
 from rebt_ros.demonstration.builder import BadMessageError, Fault
-from rebt_ros.logic.conditions import LastActionIs
 
 
 class Message(NamedTuple):
@@ -34,11 +33,7 @@ class TreeInputs:
     """
 
     def __init__(self, learned: LearnedTree, default_topic: str, timeout: int) -> None:
-        tested = {
-            one.literal.condition.feature
-            for one in nodes.conditions(learned.tree)
-            if not isinstance(one.literal.condition, LastActionIs)
-        }
+        tested = nodes.features(learned.tree)
         self._read = {
             place: replace(
                 feature,

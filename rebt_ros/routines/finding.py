@@ -143,7 +143,7 @@ def _found(
 def _gist(node: nodes.Node) -> object:
     """What is the same in routines that differ in thresholds and the order of conditions alone."""
     match node:
-        case nodes.Condition(literal=Literal(condition=Threshold(feature=name), positive=positive)):
+        case nodes.Condition(literal=Literal(Threshold(quantity=name), positive)):
             return name, positive
         case nodes.Selector(children=children):
             return frozenset(_gist(child) for child in children)

@@ -109,7 +109,7 @@ def holds(guard: Guard, states: FloatArray, features: Sequence[Feature]) -> Bool
         fulfilled = np.zeros(len(states), dtype=bool)
         for literal in clause:
             match literal.condition:
-                case Threshold(name, value):
+                case Threshold(str(name), value):
                     true = states[:, column[name]] <= value
                 case IsTrue(name):
                     true = states[:, column[name]] == 1

@@ -23,7 +23,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from rebt_ros.arrays import FloatArray
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, Fault, StateTopic
-from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.fields import fields_of
 from rebt_ros.errors import InputError, RebtError
 from rebt_ros.storage.bag_safety import check_bag, check_expansion, expansion, guarded_databases
@@ -87,7 +87,10 @@ def read_bag(
         if first is None or builder.features is None:
             raise InputError(f"{path} gives no rows: {feed.why_no_rows(states, actions)}.")
         demonstration = Demonstration.from_rows(
-            path.absolute().name, builder.features, chain((first,), rows)
+            path.absolute().name,
+            builder.features,
+            chain((first,), rows),
+            RowKind.EVENT if sample_rate is None else RowKind.SAMPLE,
         )
     return Read(demonstration, feed.notes())
 

@@ -1,4 +1,4 @@
-"""CSV tables as demonstrations: one table is one demonstration, one row is one action event.
+"""CSV tables as demonstrations: one table is one demonstration, one row is one action.
 
 A column is numeric where all its cells are numbers, binary where they all say true or false, and
 categorical otherwise.  An empty cell is a missing value.  Where several columns hold actions, a
@@ -21,6 +21,7 @@ from rebt_ros.demonstration.builder import LARGEST_VALUE
 from rebt_ros.demonstration.demonstration import (
     DEFAULT_CHANNEL,
     Demonstration,
+    RowKind,
     in_sorted_order,
 )
 from rebt_ros.demonstration.schema import Feature, FeatureKind
@@ -39,7 +40,13 @@ OUTCOME_SUFFIX = ".outcome"
 _LISTED = 8
 
 
-def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> Read:
+def read_csv(
+    path: Path,
+    *,
+    labels: Sequence[str] = (),
+    header: bool = True,
+    row_kind: RowKind | None = None,
+) -> Read:
     """Reads a CSV table.
 
     Args:
@@ -48,6 +55,8 @@ def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> 
             (`24`); by default the last column.
         header: Whether the first line names the columns (`x0`, `x1`, ... if not).  A first line
             that holds data all the same is recognised by its numbers and noted.
+        row_kind: What a row is; None: an event where a column says how actions ended, else a
+            sample.
 
     Returns:
         The rows that have an action: on the channel `DEFAULT_CHANNEL` where there is one label
@@ -66,6 +75,8 @@ def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> 
     shown = _Shown(table, labelled, cells)
     stamps = shown.stamps(notes)
     left_out = _outcomes(table, notes)
+    if row_kind is None:
+        row_kind = RowKind.EVENT if left_out else RowKind.SAMPLE
     if stamps is not None:
         left_out.add(STAMP)
     features, columns = _states(shown, left_out, notes)
@@ -82,6 +93,7 @@ def read_csv(path: Path, *, labels: Sequence[str] = (), header: bool = True) -> 
             chosen,
             channels,
             channel,
+            row_kind=row_kind,
         ),
         tuple(notes),
     )

@@ -8,7 +8,7 @@ from enum import Enum
 from pathlib import Path
 
 from rebt_ros.demonstration.builder import StateTopic
-from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.storage.bag import METADATA, STORAGE_SUFFIXES, read_bag
 from rebt_ros.storage.csv_table import read_csv
@@ -24,6 +24,8 @@ class InputOptions:
     labels: tuple[str, ...] = ()
     """For CSV tables."""
     header: bool = True
+    """For CSV tables."""
+    row_kind: RowKind | None = None
     """For CSV tables."""
     state_topics: tuple[StateTopic, ...] = ()
     """For bags."""
@@ -116,6 +118,7 @@ def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
     given = (
         (bool(options.labels), "a label column", InputKind.TABLE),
         (not options.header, "the absence of a header", InputKind.TABLE),
+        (options.row_kind is not None, "what a row is", InputKind.TABLE),
         (bool(options.state_topics), "a state topic", InputKind.BAG),
         (bool(options.action_topics), "an action topic", InputKind.BAG),
         (options.sample_rate is not None, "a sample rate", InputKind.BAG),
@@ -129,7 +132,7 @@ def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
 
 
 def _table(path: Path, options: InputOptions) -> Read:
-    return read_csv(path, labels=options.labels, header=options.header)
+    return read_csv(path, labels=options.labels, header=options.header, row_kind=options.row_kind)
 
 
 def _recording(path: Path, _: InputOptions) -> Read:

@@ -1,0 +1,79 @@
+"""Which differences of two features a tree may test: ``left < right``, ``goal_x − x > 0.3``.
+
+A tree that compares one feature at a time needs many splits for what a difference says in one.
+But n features have n (n - 1) / 2 differences, most of which mean nothing.  Those are offered whose
+features are of one scale, and that a tree of some of the rows makes use of.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from sklearn.tree import DecisionTreeClassifier
+
+from rebt_ros.arrays import FloatArray
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary, columns, encode
+from rebt_ros.demonstration.builder import LARGEST_VALUE
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Difference
+
+#: Percentiles between which a feature ranges, and how much the ranges of two may differ.
+_FROM, _TO, _MOST_RATIO = 5.0, 95.0, 2.0
+#: Rows of the tree that shows which differences are of use, evenly spread.
+_MOST_ROWS = 2_000
+#: Differences are made of so many features, the first ones: this bounds the columns.
+_MOST_FEATURES = 24
+#: How many differences are offered, and the least share that one must have in what a tree tells.
+_MOST_DIFFERENCES, _LEAST_SHARE = 6, 0.02
+
+
+def likely_differences(
+    table: DemonstrationTable, vocabulary: Vocabulary, random_state: int = 0
+) -> tuple[Difference, ...]:
+    """The differences that a tree makes most use of.
+
+    Args:
+        table: At least one row.
+        vocabulary: What the tree may test beside them.
+        random_state: Decides between equally good splits.
+
+    Returns:
+        At most six, in the order of the features.
+    """
+    possible = _of_one_scale(table)
+    if not possible:
+        return ()
+    step = -(-len(table) // _MOST_ROWS)
+    some = table.where(np.arange(len(table)) % step == 0)
+    every = Vocabulary(vocabulary.history, possible)
+    classifier = DecisionTreeClassifier(random_state=random_state)
+    classifier.fit(encode(some, every), some.chosen)
+    first = len(columns(table, FEATURES_ALONE))
+    shares = classifier.feature_importances_[first : first + len(possible)]
+    ranked = np.argsort(-shares, kind="stable")[:_MOST_DIFFERENCES]
+    return tuple(possible[place] for place in sorted(ranked) if shares[place] >= _LEAST_SHARE)
+
+
+def _of_one_scale(table: DemonstrationTable) -> tuple[Difference, ...]:
+    ranges: dict[str, float] = {}
+    for place, feature in enumerate(table.features):
+        if feature.kind is FeatureKind.NUMERIC and not feature.lag:
+            spread = _spread(table.states[:, place])
+            if spread > 0 and len(ranges) < _MOST_FEATURES:
+                ranges[feature.name] = spread
+    return tuple(
+        Difference(one, other)
+        for one, other in combinations(ranges, 2)
+        if max(ranges[one], ranges[other]) <= _MOST_RATIO * min(ranges[one], ranges[other])
+    )
+
+
+def _spread(column: FloatArray) -> float:
+    """From the 5th to the 95th percentile; 0 where nothing is known, or differences overflow."""
+    known = column[~np.isnan(column)]
+    if not len(known) or np.abs(known).max() > LARGEST_VALUE / 2:
+        return 0.0
+    low, high = np.percentile(known, (_FROM, _TO))
+    return float(high - low)
