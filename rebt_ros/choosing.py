@@ -5,7 +5,7 @@ All is decided in cross-validation, on rows that a tree was not learned from:
 - whether the tree may test the previous action, by the mean recall of unpruned trees after their
   own choices;
 - whether it may test differences of features, by agreement and size;
-- the pruning level, by mean recall (see `selection`);
+- the pruning level, by mean recall: pruning has to pay (see `selection`);
 - PSA nodes, by own-history agreement.
 """
 
@@ -28,6 +28,7 @@ from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import OptionError
 from rebt_ros.logic.conditions import Difference
 from rebt_ros.options import LearnOptions, Use
 from rebt_ros.selection import MOST_FOLDS, CrossValidation, JudgedLevels
@@ -83,6 +84,9 @@ def choose(
         table: By its rows alone.
         options: What is left to choose.
         advance: Told which share of the work is behind; there may be less of it.
+
+    Raises:
+        OptionError: There is no such pruning level as is asked for.
     """
     if len(table) < _FEWEST_ROWS:
         return _unjudged(table, options)
@@ -90,16 +94,29 @@ def choose(
     vocabulary = choice.vocabulary()
     judged = choice.judged(vocabulary)
     levels = judged.levels(partial(own_history_choices, options=options, psa=False))
-    ccp_alpha, reasons = options.ccp_alpha, choice.reasons
+    ccp_alpha, reasons = _asked_for(judged.fitted, options), choice.reasons
     if ccp_alpha is None:
-        ccp_alpha = float(levels.ccp_alphas[levels.best])
+        ccp_alpha = float(levels.ccp_alphas[levels.chosen])
+        recalls = levels.mean_recalls
         reasons.append(
-            f"Of {len(levels.ccp_alphas)} pruning levels, ccp_alpha = {ccp_alpha:.3g} has the best "
-            f"mean recall ({levels.mean_recalls[levels.best]:.1%}, "
-            f"{levels.mean_recalls[0]:.1%} unpruned)."
+            f"Of {len(recalls)} pruning levels, ccp_alpha = {ccp_alpha:.3g} makes the largest tree "
+            f"whose mean recall ({recalls[levels.chosen]:.1%}) is not clearly below the best "
+            f"({recalls[levels.best]:.1%}; {recalls[0]:.1%} unpruned)."
         )
     psa, reason = _choose_psa(judged, ccp_alpha, options)
     return ChosenPolicy(judged.fitted, ccp_alpha, psa, levels, (*reasons, reason))
+
+
+def _asked_for(fitted: FittedTree, options: LearnOptions) -> float | None:
+    """The ``ccp_alpha`` that the options come to; None where it is left to choose."""
+    if options.level is None:
+        return options.ccp_alpha
+    if options.level >= len(fitted.path):
+        raise OptionError(
+            f"there is no pruning level {options.level}: the last one is {len(fitted.path) - 1}, "
+            "a tree that does one thing whatever happens."
+        )
+    return float(fitted.path.alphas[options.level])
 
 
 def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.Node:
@@ -151,7 +168,7 @@ def _unjudged(table: DemonstrationTable, options: LearnOptions) -> ChosenPolicy:
         upsample=options.upsample,
     )
     reason = f"{len(table)} rows are too few to choose by: the tree is not pruned."
-    ccp_alpha = options.ccp_alpha or 0.0
+    ccp_alpha = _asked_for(fitted, options) or 0.0
     return ChosenPolicy(fitted, ccp_alpha, options.psa is Use.ALWAYS, None, (reason,))
 
 
@@ -212,10 +229,10 @@ class _Choice:
         with_them = self.judged(replace(vocabulary, differences=differences), telling=True)
         before, after = without.levels(choices), with_them.levels(choices)
         leaves = [
-            int(judged.fitted.path.leaf_counts()[levels.best])
+            int(judged.fitted.path.leaf_counts()[levels.chosen])
             for judged, levels in ((without, before), (with_them, after))
         ]
-        agreements = [float(levels.means[levels.best]) for levels in (before, after)]
+        agreements = [float(levels.means[levels.chosen]) for levels in (before, after)]
         compared = (
             f"{leaves[1]} instead of {leaves[0]} leaves, agreement {agreements[1]:.1%} instead of "
             f"{agreements[0]:.1%}"

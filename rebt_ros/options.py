@@ -50,6 +50,8 @@ class LearnOptions:
     ccp_alpha: float | None = None
     """Complexity parameter of minimal cost-complexity pruning, 0 prunes nothing; None to choose
     it by cross-validation."""
+    level: int | None = None
+    """Number of the pruning level, 0 prunes nothing, instead of a complexity parameter."""
     root: Root = Root.SELECTOR
     reductions: Reductions | None = ALL_REDUCTIONS
     """Reductions past the paper; None for Algorithm 1 as printed."""
@@ -83,6 +85,10 @@ class LearnOptions:
             raise OptionError(f"max_depth must be at least 1, not {self.max_depth}.")
         if self.ccp_alpha is not None and not 0 <= self.ccp_alpha < math.inf:
             raise OptionError(f"ccp_alpha must be 0 or more, not {self.ccp_alpha:g}.")
+        if self.level is not None and self.level < 0:
+            raise OptionError(f"level must be 0 or more, not {self.level}.")
+        if self.level is not None and self.ccp_alpha is not None:
+            raise OptionError("level and ccp_alpha both say how far to prune: give one of them.")
         if not 0 <= self.test_fraction < 1:
             raise OptionError(
                 f"test_fraction must be at least 0 and less than 1, not {self.test_fraction:g}."

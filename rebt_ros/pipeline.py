@@ -212,17 +212,19 @@ def learn_from(
     progress("choosing", _CHOOSING)
     policy = choose(
         shown,
-        options,
+        # A level is one of the tree that is published.
+        replace(options, level=None) if options.refit else options,
         lambda share: progress("choosing", _CHOOSING + (_JUDGING - _CHOOSING) * share),
     )
     progress("judging", _JUDGING)
-    judge = policy.fitted
-    figures = figures_of(table.where(held_out), judge.at(policy.ccp_alpha), options, policy.psa)
+    judge, ccp_alpha = policy.fitted, policy.ccp_alpha
     learned_from = shown
-    if options.refit and held_out.any():
+    if options.refit:
         progress("learning from all rows", _JUDGING)
         learned_from = table
         policy = _from_all(table, options, policy)
+        ccp_alpha = ccp_alpha if options.level is None else policy.ccp_alpha
+    figures = figures_of(table.where(held_out), judge.at(ccp_alpha), options, policy.psa)
     trained = pruned(policy.fitted, policy.ccp_alpha, learned_from, options)
     whole = convert(trained, options, psa=policy.psa)
     progress("suggesting", 0.9)
@@ -254,7 +256,7 @@ def _from_all(
 
     Of few rows each one counts, also for what is chosen.
     """
-    if len(table) <= _CHOSEN_FROM_ALL:
+    if len(table) <= _CHOSEN_FROM_ALL or options.level is not None:
         return choose(table, options)
     fitted = fit(
         table,

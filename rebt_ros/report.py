@@ -138,10 +138,7 @@ def report_on(
     if levels is not None:
         level = levels.at(ccp_alpha)
         mean_recall, agreement = float(levels.mean_recalls[level]), float(levels.means[level])
-        recalls = [
-            hits / rows if rows else None
-            for hits, rows in zip(levels.hits[level].tolist(), levels.shown.tolist(), strict=True)
-        ]
+        recalls = [None if np.isnan(one) else one for one in levels.recalls[level].tolist()]
     taken = {action.label for action in nodes.actions(tree)}
     states = _codes_of_states(table)
     conflicts = after_history = _conflicts(states, table.chosen)

@@ -1,14 +1,17 @@
-"""Choosing a pruning level by cross-validation.
+"""Choosing a pruning level by cross-validation: pruning has to pay.
 
 recall
     Of an action: the share of its rows on which a tree takes it, of the rows that it was not
     learned from.
 
 A level is judged by its mean recall over all actions, so that an action that is rare but decisive
-counts as much as a frequent one.  The best level is chosen, and of equals the one with the larger
-tree: rows that decide a task are few, and pruning them away costs the task.  A rule of one
-standard error, as is usual, would prune them: between folds it measures how much demonstrations
-differ.
+counts as much as a frequent one.  The largest tree is chosen that is not clearly worse than the
+best one: by more than three quarters of a standard error of their difference, fold by fold.  Where
+demonstrators err, large trees are clearly worse, and pruned.  Elsewhere the few rows that decide a
+task stay.
+
+The usual rule of one standard error (Breiman et al., 1984) is another one: it takes the smallest
+tree, and an error that measures how much demonstrations differ instead of how much trees do.
 """
 
 from __future__ import annotations
@@ -27,6 +30,9 @@ from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.evaluation import decision_tree_choices
 
 MOST_FOLDS = 5
+#: Standard errors of a difference from which on it is clear.  A difference that a single fold makes
+#: is one standard error large, and clear; one on which folds disagree is not.
+_CLEAR = 0.75
 #: Folds of large tables, each of which has rows enough.
 _FEW_FOLDS, _MANY_ROWS = 3, 8_000
 #: A tree that may test LAT has to be converted and run through the rows to be judged: so many
@@ -44,12 +50,15 @@ class JudgedLevels:
 
     ccp_alphas: FloatArray
     """Ascending, shape (levels,): larger means a smaller tree."""
-    scores: FloatArray
-    """Agreement with the rows of each fold, shape (folds, levels)."""
     hits: IntArray
-    """Rows of each action, over all folds, on which a level takes it, shape (levels, actions)."""
+    """Rows of each action on which a level takes it, shape (folds, levels, actions)."""
     shown: IntArray
-    """Rows of each action, over all folds, shape (actions,)."""
+    """Rows of each action, shape (folds, actions)."""
+
+    @property
+    def scores(self) -> FloatArray:
+        """Agreement with the rows of each fold, shape (folds, levels)."""
+        return np.asarray(self.hits.sum(axis=2) / self.shown.sum(axis=1)[:, np.newaxis])
 
     @property
     def means(self) -> FloatArray:
@@ -59,25 +68,50 @@ class JudgedLevels:
     @property
     def standard_errors(self) -> FloatArray:
         """Standard error of each mean agreement, shape (levels,)."""
-        folds = len(self.scores)
-        if folds < 2:
-            return np.zeros(self.scores.shape[1])
-        return np.asarray(np.std(self.scores, axis=0, ddof=1) / np.sqrt(folds))
+        return _standard_error(self.scores)
+
+    @property
+    def recalls(self) -> FloatArray:
+        """Recall of each action over all folds, NaN where it was not shown: (levels, actions)."""
+        shown = self.shown.sum(axis=0)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.hits.sum(axis=0) / shown)
 
     @property
     def mean_recalls(self) -> FloatArray:
         """Mean recall of the actions at each level, shape (levels,)."""
-        return mean_recall(self.hits, self.shown)
-
-    def at(self, ccp_alpha: float) -> int:
-        """The level that a ``ccp_alpha`` comes to."""
-        return max(int(np.searchsorted(self.ccp_alphas, ccp_alpha, side="right")) - 1, 0)
+        return np.asarray(self._contributions.sum(axis=0))
 
     @property
     def best(self) -> int:
         """The level with the highest mean recall; of equals, the one with the largest tree."""
         # Sums of the same shares in another order may differ in the last bits.
         return int(np.argmax(np.round(self.mean_recalls, 12)))
+
+    @property
+    def chosen(self) -> int:
+        """The largest tree that is not clearly worse than the best."""
+        contributions, best = self._contributions, self.best
+        worse = contributions[:, [best]] - contributions
+        clearly = _CLEAR * len(worse) * _standard_error(worse)
+        return int(np.argmax(np.round(worse.sum(axis=0) - clearly, 12) <= 0))
+
+    def at(self, ccp_alpha: float) -> int:
+        """The level that a ``ccp_alpha`` comes to."""
+        return max(int(np.searchsorted(self.ccp_alphas, ccp_alpha, side="right")) - 1, 0)
+
+    @property
+    def _contributions(self) -> FloatArray:
+        """What each fold adds to the mean recall, shape (folds, levels)."""
+        shown = self.shown.sum(axis=0)
+        return np.asarray(np.mean(self.hits[..., shown > 0] / shown[shown > 0], axis=2))
+
+
+def _standard_error(values: FloatArray) -> FloatArray:
+    """Of the mean over the first axis; 0 where there is one value only."""
+    if len(values) < 2:
+        return np.zeros(values.shape[1:])
+    return np.asarray(np.std(values, axis=0, ddof=1) / np.sqrt(len(values)))
 
 
 def mean_recall(hits: IntArray, shown: IntArray) -> FloatArray:
@@ -160,10 +194,10 @@ class CrossValidation:
     def unpruned_recall(self) -> float:
         """Mean recall of the folds' unpruned trees, after their own choices."""
         unpruned = np.zeros(1)
-        hits = sum(
+        hits = [
             self._run(place, unpruned, decision_tree_choices) for place in range(len(self._folds))
-        )
-        return float(mean_recall(np.asarray(hits), self._shown)[0])
+        ]
+        return float(self._judged(unpruned, hits).mean_recalls[0])
 
     def own_history_at(self, ccp_alpha: float, choices: Choices) -> float:
         """Mean own-history agreement of the folds' trees at one level."""
@@ -174,13 +208,10 @@ class CrossValidation:
     @property
     def _shown(self) -> IntArray:
         counts = [np.bincount(rows.chosen, minlength=self._actions) for _, rows in self._folds]
-        return np.asarray(np.sum(counts, axis=0))
+        return np.array(counts)
 
     def _judged(self, ccp_alphas: FloatArray, hits: list[IntArray]) -> JudgedLevels:
-        scores = [
-            its.sum(axis=1) / len(rows) for its, (_, rows) in zip(hits, self._folds, strict=True)
-        ]
-        return JudgedLevels(ccp_alphas, np.array(scores), np.sum(hits, axis=0), self._shown)
+        return JudgedLevels(ccp_alphas, np.array(hits), self._shown)
 
     def _run(self, fold: int, ccp_alphas: FloatArray, choices: Choices) -> IntArray:
         """The hits of a fold's trees at some levels, after their own choices."""

@@ -9,12 +9,15 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from rebt_ros import offline
 from rebt_ros.algorithms.priority_root import Reductions
 from rebt_ros.algorithms.suggestions import PsaChoice
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
 from rebt_ros.behavior_tree.text import render_text
+from rebt_ros.choosing import ChosenPolicy
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import add_input_options, aligned, input_options, run, use_color
 from rebt_ros.decision_tree.upsampling import Upsampling
@@ -24,6 +27,7 @@ from rebt_ros.errors import OptionError
 from rebt_ros.options import LearnOptions, Use
 from rebt_ros.pipeline import summary_sentence
 from rebt_ros.report import FORECAST, LearningReport
+from rebt_ros.selection import JudgedLevels
 
 _REDUCTIONS = {
     "domain": "do not use that thresholds, categories and last actions exclude each other",
@@ -33,11 +37,15 @@ _REDUCTIONS = {
 }
 
 
+#: Smaller trees that are listed.
+_OFFERED = 4
+
 #: Options that are left as they are unless they are asked for, by their names in `LearnOptions`.
 _ASKED = (
     "delta",
     "max_depth",
     "ccp_alpha",
+    "level",
     "history",
     "differences",
     "reaction_time",
@@ -136,8 +144,16 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
         "--ccp-alpha",
         type=_ccp_alpha,
         metavar="ALPHA|auto",
-        help="complexity parameter of pruning, larger means smaller trees; auto: the level with "
-        "the best mean recall of the actions in cross-validation (default: auto)",
+        help="complexity parameter of pruning, larger means smaller trees; auto: the largest "
+        "tree whose mean recall of the actions in cross-validation is not clearly below the best "
+        "(default: auto)",
+    )
+    learning.add_argument(
+        "--level",
+        type=int,
+        metavar="N",
+        help="number of the pruning level, instead of --ccp-alpha: larger means a smaller tree; "
+        "those on offer are listed with what each costs",
     )
     learning.add_argument(
         "--history",
@@ -254,6 +270,23 @@ def _recalls(report: LearningReport) -> Iterator[str]:
         yield f"  (agreement in cross-validation is the forecast of success: {FORECAST})"
 
 
+def _smaller(channel: str, policy: ChosenPolicy, judged: JudgedLevels) -> Iterator[str]:
+    """Smaller trees that are on offer, as a table with what each costs."""
+    alphas, leaves = policy.fitted.path.alphas, policy.fitted.path.leaf_counts()
+    chosen = int(np.searchsorted(alphas, policy.ccp_alpha, side="right")) - 1
+    smaller = range(chosen + 1, len(alphas) - 1)
+    if not smaller:
+        return
+    offered = sorted({smaller[int(place)] for place in np.linspace(0, len(smaller) - 1, _OFFERED)})
+    rows = [(f"  {channel}smaller trees", "leaves", "mean recall", "agreement")]
+    for level in (chosen, *offered):
+        name = f"  --level {level}" + (" (chosen)" if level == chosen else "")
+        place = judged.at(float(alphas[level]))
+        figures = (f"{judged.mean_recalls[place]:.1%}", f"{judged.means[place]:.1%}")
+        rows.append((name, str(leaves[level]), *figures))
+    yield from aligned(rows)
+
+
 def _values(kind: type[Enum]) -> str:
     return "|".join(str(member.value) for member in kind)
 
@@ -325,6 +358,8 @@ def _learn(parsed: argparse.Namespace) -> None:
         channel = f"{learning.table.channel}: " if len(result.learnings) > 1 else ""
         for reason in learning.policy.reasons:
             print(f"  - {channel}{reason}")
+        if learning.policy.levels is not None:
+            print("\n".join(_smaller(channel, learning.policy, learning.policy.levels)))
     if result.learned.suggestions:
         print("\n".join(_suggestions(result.learned)))
     files = "tree.json, summary.json and pictures of the tree and of its decision tree"

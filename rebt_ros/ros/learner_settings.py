@@ -99,7 +99,16 @@ def _pruning(declare: Parameters) -> dict[str, Callable[[], object]]:
         1e9,
         fixed=False,
     )
+    level = declare.integer(
+        "level",
+        -1,
+        "Number of the pruning level, 0 prunes nothing, instead of ccp_alpha; -1 for none.",
+        -1,
+        1_000_000,
+        fixed=False,
+    )
     return {
+        "level": lambda: None if (number := level()) < 0 else number,
         "max_depth": lambda: max_depth() or None,
         "ccp_alpha": lambda: None if (alpha := ccp_alpha()) < 0 else alpha,
     }
