@@ -7,6 +7,8 @@ All is decided in cross-validation, on rows that a tree was not learned from:
 - whether it may test differences of features, by agreement and size;
 - the pruning level, by mean recall: pruning has to pay (see `selection`);
 - PSA nodes, by own-history agreement.
+
+Of the trees that fit the rows equally well, the simplest one is taken (see `simplest`).
 """
 
 from __future__ import annotations
@@ -25,9 +27,11 @@ from rebt_ros.arrays import IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.decision_tree.differences import likely_differences
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
+from rebt_ros.decision_tree.simplest import simplest
 from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
-from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.demonstration.table import DemonstrationTable, part_of
 from rebt_ros.errors import OptionError
 from rebt_ros.logic.conditions import Difference
 from rebt_ros.options import LearnOptions, Use
@@ -36,8 +40,9 @@ from rebt_ros.selection import MOST_FOLDS, CrossValidation, JudgedLevels
 #: With fewer rows the folds are too small to tell anything.
 _FEWEST_ROWS = 20
 
-#: Rows by whole demonstrations that tell what a tree may test; the level is chosen by all.
-_ROWS_THAT_TELL = 6_000
+#: Of larger tables, so many rows, by whole demonstrations, tell what a tree may test; the level is
+#: chosen by all.
+_LARGE, _ROWS_THAT_TELL = 6_000, 3_000
 
 #: How much agreement differences may cost, and to which share of the leaves they have to come.
 _DEARER, _SMALLER = 0.005, 0.75
@@ -104,7 +109,15 @@ def choose(
             f"({recalls[levels.best]:.1%}; {recalls[0]:.1%} unpruned)."
         )
     psa, reason = _choose_psa(judged, ccp_alpha, options)
-    return ChosenPolicy(judged.fitted, ccp_alpha, psa, levels, (*reasons, reason))
+    fitted = judged.fitted
+    if options.simplest and options.upsample is Upsampling.NONE:
+        fitted = simplest(table, fitted)
+        if fitted is not judged.fitted:
+            reasons.append(
+                f"Of the trees that fit the rows, one with {fitted.leaves} leaves is the simplest "
+                f"({judged.fitted.leaves} where splits are chosen greedily)."
+            )
+    return ChosenPolicy(fitted, ccp_alpha, psa, levels, (*reasons, reason))
 
 
 def _asked_for(fitted: FittedTree, options: LearnOptions) -> float | None:
@@ -179,7 +192,7 @@ class _Choice:
         self, table: DemonstrationTable, options: LearnOptions, step: Callable[[], None]
     ) -> None:
         self._table, self._options, self._step = table, options, step
-        self._telling = _telling(table)
+        self._telling = table if len(table) <= _LARGE else part_of(table, _ROWS_THAT_TELL)
         self._made: dict[tuple[bool, Vocabulary], CrossValidation] = {}
         self.reasons: list[str] = []
 
@@ -221,7 +234,9 @@ class _Choice:
         options = self._options
         if options.differences is Use.NEVER:
             return ()
-        differences = likely_differences(self._telling, vocabulary, options.random_state)
+        differences = likely_differences(
+            self._telling, vocabulary, options.units, options.random_state
+        )
         if options.differences is Use.ALWAYS or not differences:
             return differences
         choices = partial(own_history_choices, options=options, psa=False)
@@ -242,17 +257,6 @@ class _Choice:
             return differences
         self.reasons.append(f"Differences of features make no better tree ({compared}).")
         return ()
-
-
-def _telling(table: DemonstrationTable) -> DemonstrationTable:
-    """Whole demonstrations, evenly spread, or the first rows of the only one."""
-    if len(table) <= _ROWS_THAT_TELL:
-        return table
-    shown, position = np.unique(table.demonstration, return_inverse=True)
-    if len(shown) == 1:
-        return table.where(np.arange(len(table)) < _ROWS_THAT_TELL)
-    kept = max(2, len(shown) * _ROWS_THAT_TELL // len(table))
-    return table.where(np.isin(position, np.arange(kept) * len(shown) // kept))
 
 
 def _choose_psa(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 
 from rebt_ros.algorithms.priority_root import ALL_REDUCTIONS, Reductions
@@ -44,6 +45,8 @@ class LearnOptions:
     action and nothing by cross-validation (paper: LAT)."""
     differences: Use = Use.AUTO
     """Whether the executed tree may test the difference of two features."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Units of features by their names: of different ones there is no difference."""
     max_depth: int | None = None
     """Splits on the decision tree's longest path; None to grow it fully, which leaves its size to
     pruning (paper: 5)."""
@@ -59,6 +62,9 @@ class LearnOptions:
     """Share of the rows, or of the demonstrations if several, that is held out; in [0, 1)."""
     refit: bool = True
     """Whether the tree is learned from all rows in the end, once it has been judged."""
+    simplest: bool = True
+    """Whether, of the trees that fit the rows, the simplest one is searched for, instead of the
+    one that is grown greedily; in trees of up to 30 leaves."""
     readable_thresholds: bool = True
     """Whether thresholds are moved to round values that splits share, within the gaps between the
     rows that were shown."""
@@ -121,6 +127,7 @@ class LearnOptions:
             root=Root.PARALLEL,
             reductions=None,
             refit=False,
+            simplest=False,
             readable_thresholds=False,
             reaction_time=0.0,
             routines=False,

@@ -265,7 +265,10 @@ def _from_all(
         random_state=options.random_state,
         upsample=options.upsample,
     )
-    return replace(policy, fitted=fitted)
+    if options.ccp_alpha is not None:
+        return replace(policy, fitted=fitted)
+    # The levels of another fit lie elsewhere: what was chosen is the range from one to the next.
+    return replace(policy, fitted=fitted, ccp_alpha=policy.fitted.path.middle(policy.ccp_alpha))
 
 
 def pruned(

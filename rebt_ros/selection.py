@@ -170,7 +170,7 @@ class CrossValidation:
             (tree, table.where(fold == number))
             for tree, number in zip(of_folds, numbers, strict=True)
         ]
-        self._middles = _middles(self.fitted.path.alphas)
+        self._middles = self.fitted.path.middles
 
     def teacher_forced(self) -> JudgedLevels:
         """All levels after what the demonstrator did."""
@@ -240,9 +240,3 @@ def folds(table: DemonstrationTable) -> IntArray:
     if len(shown) == 1:
         return np.arange(len(table)) * most // max(len(table), 1)
     return position * min(most, len(shown)) // len(shown)
-
-
-def _middles(alphas: FloatArray) -> FloatArray:
-    """Geometric middle between each ``ccp_alpha`` and the next one; the last stays."""
-    following = np.append(alphas[1:], alphas[-1])
-    return np.asarray(np.sqrt(alphas * following))

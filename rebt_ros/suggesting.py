@@ -26,7 +26,7 @@ from rebt_ros.behavior_tree.learned_tree import Suggestion
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import TrainedTree, fit
 from rebt_ros.demonstration.last_action import History
-from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.demonstration.table import DemonstrationTable, part_of
 from rebt_ros.options import LearnOptions
 from rebt_ros.routines.finding import FoundRoutine, find_routines
 
@@ -44,6 +44,8 @@ _TOO_LARGE = (
 #: Rows in which LAT paths are counted: what has not occurred in so many is no habit, and counting
 #: nested loops takes longer than learning does in many more.
 _MOST_ROWS = 100_000
+#: Rows that the LAT-augmented tree is fitted to.
+_MOST_ROWS_FITTED = 10_000
 
 
 def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[FoundRoutine, ...]:
@@ -89,7 +91,7 @@ def suggest(
     with_lat = trained
     if trained.vocabulary.history is not History.LAST:
         fitted = fit(
-            table,
+            table if options.is_paper else part_of(table, _MOST_ROWS_FITTED),
             vocabulary=Vocabulary(History.LAST),
             max_depth=options.max_depth,
             random_state=options.random_state,

@@ -349,7 +349,8 @@ def _learned_tree(place: _Place) -> LearnedTree:
     if not isinstance(place.value, dict) or place.value.get("format") != FORMAT:
         raise DocumentError(f"the document does not say that its format is {FORMAT!r}.")
     version = place.value.get("version")
-    if isinstance(version, bool) or not isinstance(version, int) or version not in _ADDED:
+    # JSON does not tell 3.0 from 3.
+    if isinstance(version, bool) or not isinstance(version, int | float) or version not in _ADDED:
         raise DocumentError(
             f"the document has version {_shown(version)}: "
             f"this release of rebt_ros reads the versions {' and '.join(map(str, _ADDED))}."
@@ -362,7 +363,7 @@ def _learned_tree(place: _Place) -> LearnedTree:
         "tree",
         "suggestions",
         "provenance",
-        *_ADDED[version],
+        *_ADDED[int(version)],
     )
     try:
         return LearnedTree(

@@ -125,6 +125,9 @@ class TreeRuntime:
         # Afterwards, so that all conditions of one tick see the same history.
         for action, status in self._ticked:
             self._note(action, status)
+        if self._running:
+            # What ran and was not ticked was interrupted, and nothing has taken its place.
+            self._end(self._running.keys() - {action.channel for action, _ in self._ticked})
         return Tick(self.root.status, tuple(action for action, _ in self._ticked))
 
     def _note(self, action: nodes.Action, status: Status) -> None:
@@ -142,6 +145,11 @@ class TreeRuntime:
         else:
             history.take(action.label)
 
+    def _end(self, channels: set[str]) -> None:
+        """Notes that what runs on these channels has been interrupted."""
+        for channel in channels:
+            self.histories[channel].previous = self._running.pop(channel)
+
     @property
     def tip(self) -> str:
         """What the deepest node that decided in the last tick says; empty where none did."""
@@ -151,9 +159,7 @@ class TreeRuntime:
     def halt(self) -> None:
         """Interrupts whatever runs; the next tick starts afresh, with the same histories."""
         self.root.stop(Status.INVALID)
-        for channel, label in self._running.items():
-            self.histories[channel].previous = label
-        self._running.clear()
+        self._end(set(self._running))
 
     def snapshot(self) -> tuple[str, ...]:
         """The status name of every node, each parent before its children."""

@@ -50,6 +50,7 @@ _ASKED = (
     "differences",
     "reaction_time",
     "readable_thresholds",
+    "simplest",
     "refit",
     "root",
     "psa",
@@ -107,6 +108,15 @@ def _add_rows(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
             metavar="FEATURE",
             help=f"take this feature as {kind.value}, whatever it looks like; repeatable",
         )
+    rows.add_argument(
+        "--unit",
+        action="append",
+        type=_unit,
+        default=[],
+        metavar="FEATURE=UNIT",
+        help="the unit of a feature: features of different units, or one of which has none, are "
+        "not compared with each other; repeatable",
+    )
     rows.add_argument(
         "--lags",
         type=int,
@@ -223,6 +233,14 @@ def _add_form(parser: argparse.ArgumentParser) -> None:
             help=_REDUCTIONS[reduction.name],
         )
     form.add_argument(
+        "--greedy",
+        dest="simplest",
+        action="store_false",
+        default=None,
+        help="keep the decision tree as it is grown, instead of the simplest of those that fit "
+        "the rows as well",
+    )
+    form.add_argument(
         "--exact-thresholds",
         dest="readable_thresholds",
         action="store_false",
@@ -303,6 +321,13 @@ def _seconds(text: str) -> float | Literal["auto"]:
     return "auto" if text == "auto" else float(text)
 
 
+def _unit(text: str) -> tuple[str, str]:
+    feature, sign, unit = text.rpartition("=")
+    if not (feature and sign and unit):
+        raise argparse.ArgumentTypeError(f"{text!r} is not FEATURE=UNIT, such as left=m")
+    return feature, unit
+
+
 def _history(text: str) -> History | Literal["auto"]:
     return "auto" if text == "auto" else History(text)
 
@@ -324,6 +349,7 @@ def _options(parsed: argparse.Namespace) -> LearnOptions:
         routines=parsed.routines and not parsed.paper,
         random_state=parsed.random_state,
         lags=parsed.lags,
+        units=dict(parsed.unit),
         upsample=parsed.upsample,
     )
 

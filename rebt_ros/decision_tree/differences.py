@@ -7,7 +7,9 @@ features are of one scale, and that a tree of some of the rows makes use of.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import combinations
+from types import MappingProxyType
 
 import numpy as np
 from sklearn.tree import DecisionTreeClassifier
@@ -22,7 +24,7 @@ from rebt_ros.logic.conditions import Difference
 #: Percentiles between which a feature ranges, and how much the ranges of two may differ.
 _FROM, _TO, _MOST_RATIO = 5.0, 95.0, 2.0
 #: Rows of the tree that shows which differences are of use, evenly spread.
-_MOST_ROWS = 2_000
+_MOST_ROWS = 1_000
 #: Differences are made of so many features, the first ones: this bounds the columns.
 _MOST_FEATURES = 24
 #: How many differences are offered, and the least share that one must have in what a tree tells.
@@ -30,19 +32,23 @@ _MOST_DIFFERENCES, _LEAST_SHARE = 6, 0.02
 
 
 def likely_differences(
-    table: DemonstrationTable, vocabulary: Vocabulary, random_state: int = 0
+    table: DemonstrationTable,
+    vocabulary: Vocabulary,
+    units: Mapping[str, str] = MappingProxyType({}),
+    random_state: int = 0,
 ) -> tuple[Difference, ...]:
     """The differences that a tree makes most use of.
 
     Args:
         table: At least one row.
         vocabulary: What the tree may test beside them.
+        units: Of features, by their names; of different units there is no difference.
         random_state: Decides between equally good splits.
 
     Returns:
         At most six, in the order of the features.
     """
-    possible = _of_one_scale(table)
+    possible = _of_one_scale(table, units)
     if not possible:
         return ()
     step = -(-len(table) // _MOST_ROWS)
@@ -56,7 +62,7 @@ def likely_differences(
     return tuple(possible[place] for place in sorted(ranked) if shares[place] >= _LEAST_SHARE)
 
 
-def _of_one_scale(table: DemonstrationTable) -> tuple[Difference, ...]:
+def _of_one_scale(table: DemonstrationTable, units: Mapping[str, str]) -> tuple[Difference, ...]:
     ranges: dict[str, float] = {}
     for place, feature in enumerate(table.features):
         if feature.kind is FeatureKind.NUMERIC and not feature.lag:
@@ -66,7 +72,8 @@ def _of_one_scale(table: DemonstrationTable) -> tuple[Difference, ...]:
     return tuple(
         Difference(one, other)
         for one, other in combinations(ranges, 2)
-        if max(ranges[one], ranges[other]) <= _MOST_RATIO * min(ranges[one], ranges[other])
+        if units.get(one) == units.get(other)
+        and max(ranges[one], ranges[other]) <= _MOST_RATIO * min(ranges[one], ranges[other])
     )
 
 

@@ -37,6 +37,17 @@ class PruningPath:
     def __len__(self) -> int:
         return len(self.alphas)
 
+    @property
+    def middles(self) -> FloatArray:
+        """Geometric middle between each ``ccp_alpha`` and the next one; the last stays."""
+        following = np.append(self.alphas[1:], self.alphas[-1])
+        return np.asarray(np.sqrt(self.alphas * following))
+
+    def middle(self, ccp_alpha: float) -> float:
+        """The middle of the range of the level that a ``ccp_alpha`` comes to."""
+        level = np.searchsorted(self.alphas, ccp_alpha, side="right") - 1
+        return float(self.middles[level])
+
     def leaves_at(self, ccp_alpha: float) -> BoolArray:
         """Which nodes are leaves, or below a leaf, at this level, shape (nodes,)."""
         # As in scikit-learn, 0 means not to prune, also where that would cost nothing.

@@ -7,10 +7,11 @@ import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
+from sklearn.base import clone
 from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
@@ -101,6 +102,23 @@ class FittedTree:
     """What it may test beside the features."""
     notes: tuple[str, ...] = ()
     """What a person should know about the rows that it was fitted to; no full stops."""
+
+    @property
+    def leaves(self) -> int:
+        """Leaves of the tree before it is pruned."""
+        return int(self.classifier.get_n_leaves())
+
+    def right(self, table: DemonstrationTable) -> int:
+        """How many rows the tree predicts before it is pruned."""
+        return int(self.hits(table, np.zeros(1)).sum())
+
+    def path_lengths(self, table: DemonstrationTable) -> IntArray:
+        """Splits between the root and the leaf that each row reaches, shape (rows,)."""
+        depth = np.zeros(len(self.path.parents), dtype=np.int64)
+        # Parents come before their children.
+        for node in range(1, len(depth)):
+            depth[node] = depth[self.path.parents[node]] + 1
+        return np.asarray(depth[_reached(self.classifier, table, self.vocabulary)])
 
     def at(self, ccp_alpha: float) -> TrainedTree:
         """The tree as pruned at `ccp_alpha`; equal to scikit-learn's own fit with it."""
@@ -205,6 +223,25 @@ def fit(
     options = _FitOptions(vocabulary, max_depth, random_state, upsample)
     with _quiet():
         return _fitted(table, options)
+
+
+def fit_again(
+    table: DemonstrationTable, fitted: FittedTree, number: int, share: float
+) -> FittedTree:
+    """Another tree of the same rows, whose splits are chosen from random columns.
+
+    Args:
+        table: What a tree was fitted to, without made-up rows.
+        fitted: That tree, whose options are kept.
+        number: Number of the draw.
+        share: Of the columns that a split is chosen from, in (0, 1].
+    """
+    classifier = clone(fitted.classifier).set_params(
+        max_features=share, random_state=fitted.classifier.random_state + number
+    )
+    with _quiet():
+        classifier.fit(encode(table, fitted.vocabulary), table.chosen)
+    return replace(fitted, classifier=classifier, path=pruning_path(classifier))
 
 
 def fit_parts(

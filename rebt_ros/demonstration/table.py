@@ -121,6 +121,20 @@ def _share_kept(count: int, fraction: float) -> int:
     return min(max(count - math.ceil(count * fraction - 1e-9), 1), count - 1)
 
 
+def part_of(table: DemonstrationTable, rows: int) -> DemonstrationTable:
+    """About so many rows: whole demonstrations, evenly spread, or the first rows of the only one.
+
+    All where there are no more.
+    """
+    if len(table) <= rows:
+        return table
+    shown, position = np.unique(table.demonstration, return_inverse=True)
+    if len(shown) == 1:
+        return table.where(np.arange(len(table)) < rows)
+    kept = max(2, len(shown) * rows // len(table))
+    return table.where(np.isin(position, np.arange(kept) * len(shown) // kept))
+
+
 def tabulate(
     demonstrations: Sequence[Demonstration],
     declared: Mapping[str, FeatureKind] | None = None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -13,6 +13,7 @@ from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import LARGEST_LAG
+from rebt_ros.errors import OptionError
 from rebt_ros.ros.learning_process import Request
 from rebt_ros.ros.parameters import Parameters
 
@@ -124,6 +125,12 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
         choices=("auto", *(kind.value for kind in History)),
         fixed=False,
     )
+    units = declare.texts(
+        "units",
+        [],
+        "Units of features, such as left=m: features of different units are not compared.",
+        fixed=False,
+    )
     return {
         "delta": declare.number(
             "delta",
@@ -156,6 +163,13 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
             choices=_USES,
             fixed=False,
         ),
+        "units": lambda: _units(units()),
+        "simplest": declare.flag(
+            "simplest",
+            True,
+            "Whether the simplest of the trees that fit the rows is searched for, up to 30 leaves.",
+            fixed=False,
+        ),
         "readable_thresholds": declare.flag(
             "readable_thresholds",
             True,
@@ -163,6 +177,21 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
             fixed=False,
         ),
     }
+
+
+def _units(texts: Sequence[str]) -> dict[str, str]:
+    """Units by features.
+
+    Raises:
+        OptionError: A text does not name both.
+    """
+    units = {}
+    for text in texts:
+        feature, sign, unit = text.rpartition("=")
+        if not (feature and sign and unit):
+            raise OptionError(f"units has {text!r}, which is not FEATURE=UNIT, such as left=m.")
+        units[feature] = unit
+    return units
 
 
 def _rows(declare: Parameters) -> dict[str, Callable[[], object]]:

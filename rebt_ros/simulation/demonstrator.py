@@ -11,8 +11,8 @@ _BLOCKED = 0.4
 _BESIDE = 0.6
 _AIMED = 0.25
 
-#: Demonstrations after which what is learned from them drives as well; of 8, not every time.
-ENOUGH = 16
+#: Demonstrations after which what is learned from them drives as well.
+ENOUGH = 6
 
 
 def decide(state: Sequence[float]) -> str:

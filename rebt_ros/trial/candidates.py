@@ -117,6 +117,5 @@ def _entries(directory: Path, summary: Path) -> Sequence[dict[str, Any]]:
 
 def _is_entry(value: object) -> bool:
     """Whether it names a level; the name is a directory, and nothing but a number."""
-    if not isinstance(value, dict) or not isinstance(value.get("level"), str):
-        return False
-    return value["level"].isascii() and value["level"].isdecimal()
+    number = value.get("level") if isinstance(value, dict) else None
+    return isinstance(number, str) and number.isascii() and number.isdecimal()

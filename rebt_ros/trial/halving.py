@@ -70,7 +70,8 @@ def places(candidates: int, rounds_left: int) -> int:
         candidates: How many there are.
         rounds_left: How many rounds come after the one that has ended, at least 1.
     """
-    return min(candidates, max((candidates + 1) // 2, _FINALISTS ** max(rounds_left, 1)))
+    halvings_to_come = rounds_left - 1
+    return min(candidates, max((candidates + 1) // 2, _FINALISTS << halvings_to_come))
 
 
 def ranked(tallies: Sequence[Tally], sizes: Sequence[int]) -> tuple[int, ...]:
@@ -78,9 +79,7 @@ def ranked(tallies: Sequence[Tally], sizes: Sequence[int]) -> tuple[int, ...]:
     return tuple(sorted(range(len(tallies)), key=lambda one: (-_share(tallies[one]), sizes[one])))
 
 
-def going_on(
-    tallies: Sequence[Tally], sizes: Sequence[int], rounds_left: int
-) -> tuple[int, ...]:
+def going_on(tallies: Sequence[Tally], sizes: Sequence[int], rounds_left: int) -> tuple[int, ...]:
     """Who takes part in the next round, in the order in which they were given.
 
     Those leave that are worse than the best, and not only by chance; of the others, all but the

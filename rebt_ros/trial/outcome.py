@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol
 
 from rebt_ros.errors import InputError
 
@@ -24,6 +25,25 @@ class Ending(Enum):
     """It took too long, which is a failure."""
     STOPPED = "stopped"
     """A person took over, or disabled the executor, which is a failure."""
+
+
+class VoidEpisodeError(Exception):
+    """The episode says nothing about the tree and is driven again; no user ever sees this."""
+
+
+class Judge(Protocol):
+    """Says how episodes go."""
+
+    def begin(self) -> None:
+        """Is told that the next episode is about to begin."""
+
+    def success(self) -> bool | None:
+        """Whether the episode has succeeded; None while that is not known.
+
+        Raises:
+            VoidEpisodeError: The episode is to be driven again.
+            RebtError: What the world says is not understood.
+        """
 
 
 @dataclass(frozen=True, slots=True)

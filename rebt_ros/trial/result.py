@@ -55,7 +55,7 @@ def verdict(result: TrialResult) -> str:
         return sentence
     names = ", ".join(result.candidates[one.candidate].name for one in rivals)
     level = all(one.tally == tally for one in rivals)
-    why = "it is the smallest of them" if level else "more episodes would tell"
+    why = "none of these is smaller" if level else "more episodes would tell"
     return f"{sentence} So many episodes do not tell it from {names}: {why}."
 
 
@@ -109,5 +109,3 @@ def _outcome(episode: Episode) -> dict[str, Any]:
         "ending": episode.ending.value,
         "start": episode.start,
     }
-
-

@@ -78,8 +78,7 @@ class TrialSettings:
             raise OptionError("--outcome-field is of a topic's messages: give --outcome-topic.")
         if self.start is not None and self.reset_service is None:
             raise OptionError(
-                "a start holds from the next reset on: give --reset-service with "
-                "--start-parameter."
+                "a start holds from the next reset on: give --reset-service with --start-parameter."
             )
         if self.time_limit is None:
             if self.told_by_reset:

@@ -58,15 +58,19 @@ class Tally:
         high = 1.0 if self.successes == count else min(middle + half, 1.0)
         return Interval(low, high)
 
-    def surely_above(self, other: Tally) -> bool:
-        """Whether its share is larger, and not only by chance, at `CONFIDENCE`.
+    def least_lead(self, other: Tally) -> float:
+        """By how much its share is above another one at least, at `CONFIDENCE`; -1..1.
 
-        The interval of the difference is Newcombe's (1998, method 10), made of both Wilson
+        The lower end of Newcombe's interval of a difference (1998, method 10), made of both Wilson
         intervals, as if the episodes of the two had nothing to do with each other; where they have
         the same starts, that is on the safe side.
         """
         mine, others = self.share, other.share
         if mine is None or others is None:
-            return False
-        difference = mine - others
-        return difference > math.hypot(mine - self.interval.low, other.interval.high - others)
+            return -1.0
+        chance = math.hypot(mine - self.interval.low, other.interval.high - others)
+        return mine - others - chance
+
+    def surely_above(self, other: Tally) -> bool:
+        """Whether its share is larger, and not only by chance."""
+        return self.least_lead(other) > 0

@@ -1,0 +1,318 @@
+"""Reaction time: how late a demonstrator acted, read off the demonstrations, and undone.
+
+delay
+    Rows that pass until a decision is acted on: row t's action belongs to the state d rows before.
+explanation
+    A decision tree of actions, with the rows that it gets wrong as exceptions.  Its size is the
+    number of its leaves and exceptions, of the pruned tree for which that is least.
+
+People act 0.1 to 0.5 s late.  At the true delay, actions follow from states by the demonstrator's
+own rules; at any other one, a tree must make up for what happened in between.  So its explanation
+is the smallest there.  All delays explain the same rows, with the same actions before them: only
+the states that they belong to differ.
+
+A tree that may test the previous action leans on it, as actions are held, and then hardly sees a
+delay; one that may not cannot explain a task that needs memory.  So both are asked (see
+`estimate`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rebt_ros.arrays import IntArray
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
+from rebt_ros.decision_tree.training import FittedTree, fit
+from rebt_ros.demonstration.lags import evenly_spaced
+from rebt_ros.demonstration.last_action import NO_ACTION, History, previous_actions
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import OptionError
+
+#: Reactions take up to 0.5 s; a peak is seen only where there is a later delay to compare with.
+_LATEST = 0.6
+#: Delays up to that many rows are tried where stamps tell no time.
+_MOST_ROWS = 6
+#: Stamps closer to each other than that are numbers of rows (nanoseconds).
+_NO_TIME = 1_000
+#: Delays lose the first rows of each demonstration: at most this share of the usual one.
+_LOST = 1 / 3
+#: Delays that are tried at first; between them, only those around the best are.
+_FIRST_TRIALS = 8
+#: Rows that are explained, in so many stretches: as many fits as there are trials then cost about
+#: as much as one or two to 20,000 rows.
+_ROWS, _STRETCHES = 2_000, 10
+#: States alone explain late actions only if that takes at most so many times what states with
+#: previous actions take to explain actions that are not late.
+_ALONE = 1.5
+#: The explanation must be smaller by that many standard errors, and by that share.
+_STANDARD_ERRORS, _SHARE = 1.0, 0.1
+
+_WITH_PREVIOUS = Vocabulary(history=History.PREVIOUS)
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """How large the explanations are if the demonstrator was late by so many rows."""
+
+    rows: int
+    alone: int
+    """Size of the explanation by states alone."""
+    with_previous: int
+    """Size of the explanation by states and the previous action."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReactionTime:
+    """How late a demonstrator acted."""
+
+    rows: int
+    """The delay; 0 unless one is clear."""
+    seconds: float | None
+    """The same in seconds; None where stamps tell no time."""
+    sentence: str
+    """What to tell a person; without a full stop."""
+    trials: tuple[Trial, ...] = ()
+    """What was compared, by ascending delay; empty where nothing could be."""
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the demonstrator was found to be late."""
+        return self.rows > 0
+
+
+def shifted(table: DemonstrationTable, rows: int) -> DemonstrationTable:
+    """The table with actions moved back to the states that they are answers to.
+
+    Row t gets the action of row t + `rows` of its demonstration; the last rows, which then have no
+    action, are left out, and so are demonstrations that have no others.  What was done before each
+    row is derived from the moved actions; where something was done before a demonstration began,
+    LAT of its first row still knows about that.
+
+    Args:
+        table: Rows of one channel, in whole demonstrations.
+        rows: The delay, 0 or more.
+
+    Raises:
+        OptionError: No demonstration is longer than the delay.
+    """
+    if not rows:
+        return table
+    place, length = _places(table)
+    has_action = place < length - rows
+    if not has_action.any():
+        raise OptionError(
+            f"no demonstration is longer than a reaction time of {rows} rows: give a shorter one."
+        )
+    states = table.where(has_action)
+    before = table.before
+    if before is not None:
+        shown, first = np.unique(states.demonstration, return_index=True)
+        moved = np.full_like(before, NO_ACTION)
+        moved[shown] = table.last[np.flatnonzero(has_action)[first] + rows]
+        before = np.where(before == NO_ACTION, NO_ACTION, moved)
+    chosen = table.chosen[np.flatnonzero(has_action) + rows]
+    previous = previous_actions(chosen, states.demonstration)
+    return replace(states, chosen=chosen, before=before, previous=previous)
+
+
+def rows_in(table: DemonstrationTable, seconds: float) -> int:
+    """How many rows a time is, to the nearest one.
+
+    Raises:
+        OptionError: The table's stamps tell no time.
+    """
+    gap = _gap(table)
+    if not seconds:
+        return 0
+    if gap is None:
+        raise OptionError(
+            "a reaction time in seconds needs rows with stamps: give the table a column 'stamp' "
+            "(nanoseconds)."
+        )
+    return round(seconds / gap)
+
+
+def estimate(table: DemonstrationTable) -> ReactionTime:
+    """How late the demonstrator acted, where that is clear.
+
+    Delays up to 0.6 s (6 rows, where stamps tell no time) are tried; the longest one only shows
+    that sizes rise again.  It takes the delay with the smallest explanation by states alone, unless
+    that is much larger than the one by states and previous actions without a delay: then the task
+    needs memory, and the delay with the smallest explanation of that kind is taken.  Of neighbours
+    that are equally small it is the one in the middle; if they reach to the longest delay, as where
+    the next states follow from the one before, the first of them.
+
+    A delay is clear if its explanation is smaller than the one without a delay by a tenth and by a
+    standard error, where sizes are counts: of a and b, the standard error is the root of a + b.
+
+    Args:
+        table: Samples of one channel, in whole demonstrations.
+
+    Returns:
+        Deterministic; a delay of 0 where there is nothing to compare.
+    """
+    gap = _gap(table)
+    nothing = None if gap is None else 0.0
+    why_not, most = _most(table, gap)
+    if why_not:
+        return ReactionTime(0, nothing, why_not)
+    trials = _Trials(table, most)
+    if not trials.could_be_smaller:
+        return ReactionTime(0, nothing, _NOT_LATE, trials.made)
+    trials.refine()
+    rows = _clear(trials.made)
+    if not rows:
+        return ReactionTime(0, nothing, _NOT_LATE, trials.made)
+    seconds = None if gap is None else rows * gap
+    rows_text = f"{rows} row" if rows == 1 else f"{rows} rows"
+    late = rows_text if seconds is None else f"{seconds:.2f} s ({rows_text})"
+    sentence = f"the demonstrator acted {late} late; actions are learned as of when they were due"
+    return ReactionTime(rows, seconds, sentence, trials.made)
+
+
+_NOT_LATE = "no reaction time shows: actions are learned as of when they were taken"
+
+
+def _places(table: DemonstrationTable) -> tuple[IntArray, IntArray]:
+    """Each row's place in its demonstration and the rows of that, both of shape (rows,)."""
+    first = np.searchsorted(table.demonstration, table.demonstration)
+    end = np.searchsorted(table.demonstration, table.demonstration, side="right")
+    return np.arange(len(table)) - first, end - first
+
+
+def _gap(table: DemonstrationTable) -> float | None:
+    """Seconds from a row to the next; None where stamps tell no time."""
+    gaps = np.diff(table.stamps)[np.diff(table.demonstration) == 0]
+    gap = float(np.median(gaps)) if len(gaps) else 0.0
+    return gap / 1e9 if gap > _NO_TIME else None
+
+
+def _most(table: DemonstrationTable, gap: float | None) -> tuple[str, int]:
+    """Why there is nothing to compare, or nothing; and the longest delay to try."""
+    if len(np.unique(table.chosen)) < 2:
+        return "no reaction time shows where one action is taken all the time", 0
+    if not evenly_spaced(table):
+        return "no reaction time can be read off rows that are not evenly spaced", 0
+    lengths = np.unique(table.demonstration, return_counts=True)[1]
+    enough = int(float(np.median(lengths)) * _LOST)
+    # The tolerance keeps jitter from leaving out the last delay.
+    most = min(enough, _MOST_ROWS if gap is None else math.floor(_LATEST / gap + 0.1))
+    if most < 2:
+        short = "demonstrations are too short" if enough < 2 else "rows are too far apart"
+        return f"no reaction time can be told: {short}", 0
+    return "", most
+
+
+class _Trials:
+    """Delays that are tried on the same rows."""
+
+    def __init__(self, table: DemonstrationTable, most: int) -> None:
+        self._table = table
+        place, _ = _places(table)
+        # Rows whose state and previous action are known whatever the delay is.
+        self._rows = _stretches(np.flatnonzero(place >= most))
+        self._most = most
+        self._made: dict[int, Trial] = {}
+        self._try(0)
+
+    @property
+    def made(self) -> tuple[Trial, ...]:
+        return tuple(self._made[rows] for rows in sorted(self._made))
+
+    @property
+    def could_be_smaller(self) -> bool:
+        """Whether any explanation can be smaller than those without a delay.
+
+        Every action takes a leaf or an exception.
+        """
+        least = len(np.unique(self._table.chosen[self._rows]))
+        return min(self._made[0].alone, self._made[0].with_previous) > least
+
+    def refine(self) -> None:
+        """Tries delays all over the range, then closer and closer ones around the best."""
+        step = math.ceil(self._most / _FIRST_TRIALS)
+        for delay in range(step, self._most + 1, step):
+            self._try(delay)
+        while step > 1:
+            step = math.ceil(step / 2)
+            best = {_peak(self.made, sizes) for sizes in (_alone(self.made), _both(self.made))}
+            for delay in sorted(best):
+                self._try(max(delay - step, 0))
+                self._try(min(delay + step, self._most))
+
+    def _try(self, delay: int) -> None:
+        if delay in self._made:
+            return
+        table, rows = self._table, self._rows
+        late = replace(
+            table,
+            states=table.states[rows - delay],
+            chosen=table.chosen[rows],
+            demonstration=table.demonstration[rows],
+            stamps=table.stamps[rows - delay],
+            before=None,
+            previous=table.previous[rows],
+        )
+        alone, with_previous = (
+            _size(fit(late, vocabulary=one)) for one in (FEATURES_ALONE, _WITH_PREVIOUS)
+        )
+        self._made[delay] = Trial(delay, alone, with_previous)
+
+
+def _stretches(rows: IntArray) -> IntArray:
+    """Not too many of the rows: long stretches from everywhere."""
+    if len(rows) <= _ROWS:
+        return rows
+    length = _ROWS // _STRETCHES
+    begins = np.linspace(0, len(rows) - length, _STRETCHES).astype(np.int64)
+    return np.asarray(rows[(begins[:, None] + np.arange(length)).ravel()])
+
+
+def _size(fitted: FittedTree) -> int:
+    """Leaves and exceptions of the pruned tree that has the fewest."""
+    tree = fitted.classifier.tree_
+    shares = tree.value[:, 0, :]
+    right = np.max(shares, axis=1) / np.sum(shares, axis=1)
+    sizes = (1 + np.rint(tree.n_node_samples * (1 - right)).astype(np.int64)).tolist()
+    left, other = tree.children_left.tolist(), tree.children_right.tolist()
+    # Children come after their parents.
+    for node in range(tree.node_count - 1, -1, -1):
+        if left[node] >= 0:
+            sizes[node] = min(sizes[node], sizes[left[node]] + sizes[other[node]])
+    return int(sizes[0])
+
+
+def _alone(trials: Sequence[Trial]) -> list[int]:
+    return [one.alone for one in trials]
+
+
+def _both(trials: Sequence[Trial]) -> list[int]:
+    return [one.with_previous for one in trials]
+
+
+def _clear(trials: Sequence[Trial]) -> int:
+    """The delay that is clear, or 0."""
+    sizes = _alone(trials)
+    if min(sizes) > _ALONE * trials[0].with_previous:
+        sizes = _both(trials)
+    delay = _peak(trials, sizes)
+    if delay == trials[-1].rows:
+        # Sizes may go on to fall.
+        return 0
+    size = min(sizes)
+    gain = sizes[0] - size
+    is_clear = gain >= max(_STANDARD_ERRORS * math.sqrt(sizes[0] + size), _SHARE * sizes[0])
+    return delay if is_clear else 0
+
+
+def _peak(trials: Sequence[Trial], sizes: Sequence[int]) -> int:
+    """The delay with the smallest explanation; of equal neighbours, see `estimate`."""
+    first = last = sizes.index(min(sizes))
+    while last + 1 < len(sizes) and sizes[last + 1] == sizes[first]:
+        last += 1
+    ends = last + 1 == len(sizes)
+    return trials[first if ends else (first + last) // 2].rows
