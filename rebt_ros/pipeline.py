@@ -22,13 +22,14 @@ from rebt_ros.choosing import ChosenPolicy, choose, convert, own_history_choices
 from rebt_ros.decision_tree.shown_rows import shown_rows
 from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
 from rebt_ros.decision_tree.upsampling import Upsampling
-from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.demonstration.lags import evenly_spaced, with_lags
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.options import DEFAULTS, LearnOptions
+from rebt_ros.reaction_time import ReactionTime, estimate, given, shifted
 from rebt_ros.report import LearningReport, report_on
 from rebt_ros.selection import mean_recall
 from rebt_ros.suggesting import accept, routines_of, suggest
@@ -156,6 +157,11 @@ def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
             ),
             figures=_pooled([one.figures for one in channels]),
             channels=channels,
+            late_rows=max(one.provenance.late_rows for one in trees),
+            late_seconds=max(
+                (late for one in trees if (late := one.provenance.late_seconds) is not None),
+                default=None,
+            ),
         ),
         tuple(
             replace(suggestion, id=f"{channel.channel}/{suggestion.id}")
@@ -205,8 +211,9 @@ def learn_from(
             f"the {len(table)} rows of channel {table.channel!r} show one action only ({shown!r}): "
             "demonstrate at least two, as there is nothing to decide between."
         )
+    late = reaction_time_of(table, options)
     # Before any rows are set apart, so that each still knows those before it.
-    table = with_lags(table, options.lags)
+    table = with_lags(shifted(table, late.rows), options.lags)
     held_out = table.held_out(options.test_fraction)
     shown = table.where(~held_out)
     progress("choosing", _CHOOSING)
@@ -233,20 +240,42 @@ def learn_from(
     tree, suggestions = accept(whole, suggestions, options)
     figures = replace(figures, fidelity_mismatches=mismatches(table, trained, whole))
     learned = as_learned(learned_from, trained, tree, policy.ccp_alpha, figures, options)
+    provenance = replace(
+        learned.provenance, late_rows=late.rows, late_seconds=late.seconds if late.rows else None
+    )
     ranges = shown_rows(learned_from, trained)
     history = trained.vocabulary.history
     report = report_on(learned_from, tree, history, policy.levels, policy.ccp_alpha)
     progress("done", 1.0)
     return Learning(
-        replace(learned, suggestions=suggestions, shown=(ranges,)),
+        replace(learned, provenance=provenance, suggestions=suggestions, shown=(ranges,)),
         trained,
         table,
         held_out,
         policy,
         judge,
         report,
-        (*report.notes(), *trained.notes, *notes, *_cautions(table, trained, options)),
+        (
+            *((late.sentence,) if late.rows else ()),
+            *report.notes(),
+            *trained.notes,
+            *notes,
+            *_cautions(table, trained, options),
+        ),
     )
+
+
+def reaction_time_of(table: DemonstrationTable, options: LearnOptions) -> ReactionTime:
+    """How late the demonstrator acted, as the options say or as the rows show.
+
+    Raises:
+        OptionError: It is given in seconds, but stamps tell no time.
+    """
+    if options.reaction_time is not None:
+        return given(table, options.reaction_time)
+    if table.row_kind is RowKind.EVENT:
+        return given(table, 0.0)
+    return estimate(table)
 
 
 def _from_all(

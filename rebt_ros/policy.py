@@ -240,7 +240,9 @@ def _is_reactive(tree: nodes.Node) -> bool:
         match node:
             case nodes.Sequence(memory=True) | nodes.Selector(memory=True):
                 return False
-            case nodes.Repeater() | nodes.Parallel() | nodes.Inverter(child=nodes.Action()):
+            case nodes.Repeater() | nodes.Parallel():
+                return False
+            case nodes.Inverter(child=child) if nodes.actions(child):
                 return False
             case nodes.Sequence(children=children):
                 if any(nodes.actions(child) for child in children[:-1]):

@@ -56,13 +56,10 @@ _WITH_PREVIOUS = Vocabulary(history=History.PREVIOUS)
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """How large the explanations are if the demonstrator was late by so many rows."""
+    """How large the explanation is if the demonstrator was late by so many rows."""
 
     rows: int
-    alone: int
-    """Size of the explanation by states alone."""
-    with_previous: int
-    """Size of the explanation by states and the previous action."""
+    size: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +73,9 @@ class ReactionTime:
     sentence: str
     """What to tell a person; without a full stop."""
     trials: tuple[Trial, ...] = ()
-    """What was compared, by ascending delay; empty where nothing could be."""
+    """What decided, by ascending delay; empty where nothing could be compared."""
+    by_states_alone: bool = True
+    """Whether these are explanations by states alone; else the previous action is tested, too."""
 
     @property
     def is_clear(self) -> bool:
@@ -119,6 +118,11 @@ def shifted(table: DemonstrationTable, rows: int) -> DemonstrationTable:
     return replace(states, chosen=chosen, before=before, previous=previous)
 
 
+def tells_time(table: DemonstrationTable) -> bool:
+    """Whether the stamps are more than numbers of rows."""
+    return _gap(table) is not None
+
+
 def rows_in(table: DemonstrationTable, seconds: float) -> int:
     """How many rows a time is, to the nearest one.
 
@@ -134,6 +138,18 @@ def rows_in(table: DemonstrationTable, seconds: float) -> int:
             "(nanoseconds)."
         )
     return round(seconds / gap)
+
+
+def given(table: DemonstrationTable, seconds: float) -> ReactionTime:
+    """A reaction time that a person says.
+
+    Raises:
+        OptionError: The table's stamps tell no time.
+    """
+    rows = rows_in(table, seconds)
+    return ReactionTime(
+        rows, seconds, f"actions are learned as of {seconds:g} s ({rows} rows) before, as asked"
+    )
 
 
 def estimate(table: DemonstrationTable) -> ReactionTime:
@@ -156,22 +172,20 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
         Deterministic; a delay of 0 where there is nothing to compare.
     """
     gap = _gap(table)
-    nothing = None if gap is None else 0.0
     why_not, most = _most(table, gap)
     if why_not:
-        return ReactionTime(0, nothing, why_not)
-    trials = _Trials(table, most)
-    if not trials.could_be_smaller:
-        return ReactionTime(0, nothing, _NOT_LATE, trials.made)
-    trials.refine()
-    rows = _clear(trials.made)
-    if not rows:
-        return ReactionTime(0, nothing, _NOT_LATE, trials.made)
-    seconds = None if gap is None else rows * gap
-    rows_text = f"{rows} row" if rows == 1 else f"{rows} rows"
-    late = rows_text if seconds is None else f"{seconds:.2f} s ({rows_text})"
-    sentence = f"the demonstrator acted {late} late; actions are learned as of when they were due"
-    return ReactionTime(rows, seconds, sentence, trials.made)
+        return ReactionTime(0, _seconds(0, gap), why_not)
+    trials, by_states_alone = _Explanations(table, most).trials()
+    rows = _clear(trials)
+    sentence = _NOT_LATE
+    if rows:
+        seconds = _seconds(rows, gap)
+        counted = f"{rows} row{'s' * (rows > 1)}"
+        late = counted if seconds is None else f"{seconds:.2f} s ({counted})"
+        sentence = (
+            f"the demonstrator acted {late} late; actions are learned as of when they were due"
+        )
+    return ReactionTime(rows, _seconds(rows, gap), sentence, trials, by_states_alone)
 
 
 _NOT_LATE = "no reaction time shows: actions are learned as of when they were taken"
@@ -191,6 +205,10 @@ def _gap(table: DemonstrationTable) -> float | None:
     return gap / 1e9 if gap > _NO_TIME else None
 
 
+def _seconds(rows: int, gap: float | None) -> float | None:
+    return None if gap is None else rows * gap
+
+
 def _most(table: DemonstrationTable, gap: float | None) -> tuple[str, int]:
     """Why there is nothing to compare, or nothing; and the longest delay to try."""
     if len(np.unique(table.chosen)) < 2:
@@ -207,46 +225,46 @@ def _most(table: DemonstrationTable, gap: float | None) -> tuple[str, int]:
     return "", most
 
 
-class _Trials:
-    """Delays that are tried on the same rows."""
+class _Explanations:
+    """Explanations of the same rows with several delays."""
 
     def __init__(self, table: DemonstrationTable, most: int) -> None:
         self._table = table
+        self._most = most
         place, _ = _places(table)
         # Rows whose state and previous action are known whatever the delay is.
         self._rows = _stretches(np.flatnonzero(place >= most))
-        self._most = most
-        self._made: dict[int, Trial] = {}
-        self._try(0)
 
-    @property
-    def made(self) -> tuple[Trial, ...]:
-        return tuple(self._made[rows] for rows in sorted(self._made))
-
-    @property
-    def could_be_smaller(self) -> bool:
-        """Whether any explanation can be smaller than those without a delay.
-
-        Every action takes a leaf or an exception.
-        """
+    def trials(self) -> tuple[tuple[Trial, ...], bool]:
+        """What decides, by ascending delay, and whether it is about states alone."""
+        alone = Trial(0, self._size(0, FEATURES_ALONE))
+        with_previous = Trial(0, self._size(0, _WITH_PREVIOUS))
+        # Every action takes a leaf or an exception: nothing can be smaller than that.
         least = len(np.unique(self._table.chosen[self._rows]))
-        return min(self._made[0].alone, self._made[0].with_previous) > least
+        for one in (alone, with_previous):
+            if one.size == least:
+                return (one,), one is alone
+        trials = self._around(alone, FEATURES_ALONE)
+        if min(one.size for one in trials) <= _ALONE * with_previous.size:
+            return trials, True
+        return self._around(with_previous, _WITH_PREVIOUS), False
 
-    def refine(self) -> None:
-        """Tries delays all over the range, then closer and closer ones around the best."""
+    def _around(self, without: Trial, vocabulary: Vocabulary) -> tuple[Trial, ...]:
+        """Delays from all over the range, then closer and closer ones around the best."""
         step = math.ceil(self._most / _FIRST_TRIALS)
-        for delay in range(step, self._most + 1, step):
-            self._try(delay)
-        while step > 1:
+        delays = set(range(step, self._most + 1, step))
+        made = {0: without}
+        while True:
+            for delay in sorted(delays - set(made)):
+                made[delay] = Trial(delay, self._size(delay, vocabulary))
+            trials = tuple(made[delay] for delay in sorted(made))
+            if step == 1:
+                return trials
             step = math.ceil(step / 2)
-            best = {_peak(self.made, sizes) for sizes in (_alone(self.made), _both(self.made))}
-            for delay in sorted(best):
-                self._try(max(delay - step, 0))
-                self._try(min(delay + step, self._most))
+            best = _peak(trials).rows
+            delays = {max(best - step, 0), min(best + step, self._most)}
 
-    def _try(self, delay: int) -> None:
-        if delay in self._made:
-            return
+    def _size(self, delay: int, vocabulary: Vocabulary) -> int:
         table, rows = self._table, self._rows
         late = replace(
             table,
@@ -257,10 +275,7 @@ class _Trials:
             before=None,
             previous=table.previous[rows],
         )
-        alone, with_previous = (
-            _size(fit(late, vocabulary=one)) for one in (FEATURES_ALONE, _WITH_PREVIOUS)
-        )
-        self._made[delay] = Trial(delay, alone, with_previous)
+        return _size(fit(late, vocabulary=vocabulary))
 
 
 def _stretches(rows: IntArray) -> IntArray:
@@ -286,33 +301,22 @@ def _size(fitted: FittedTree) -> int:
     return int(sizes[0])
 
 
-def _alone(trials: Sequence[Trial]) -> list[int]:
-    return [one.alone for one in trials]
-
-
-def _both(trials: Sequence[Trial]) -> list[int]:
-    return [one.with_previous for one in trials]
-
-
 def _clear(trials: Sequence[Trial]) -> int:
     """The delay that is clear, or 0."""
-    sizes = _alone(trials)
-    if min(sizes) > _ALONE * trials[0].with_previous:
-        sizes = _both(trials)
-    delay = _peak(trials, sizes)
-    if delay == trials[-1].rows:
+    without, best = trials[0], _peak(trials)
+    if best is trials[-1]:
         # Sizes may go on to fall.
         return 0
-    size = min(sizes)
-    gain = sizes[0] - size
-    is_clear = gain >= max(_STANDARD_ERRORS * math.sqrt(sizes[0] + size), _SHARE * sizes[0])
-    return delay if is_clear else 0
+    gain = without.size - best.size
+    least = max(_STANDARD_ERRORS * math.sqrt(without.size + best.size), _SHARE * without.size)
+    return best.rows if gain >= least else 0
 
 
-def _peak(trials: Sequence[Trial], sizes: Sequence[int]) -> int:
+def _peak(trials: Sequence[Trial]) -> Trial:
     """The delay with the smallest explanation; of equal neighbours, see `estimate`."""
+    sizes = [one.size for one in trials]
     first = last = sizes.index(min(sizes))
     while last + 1 < len(sizes) and sizes[last + 1] == sizes[first]:
         last += 1
     ends = last + 1 == len(sizes)
-    return trials[first if ends else (first + last) // 2].rows
+    return trials[first if ends else (first + last) // 2]

@@ -17,6 +17,7 @@ from rebt_ros.demonstration.last_action import NO_ACTION
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, category, tabulate
 from rebt_ros.errors import InputError
+from rebt_ros.reaction_time import rows_in, shifted, tells_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,9 @@ class Replay:
 def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tuple[Replay, ...]:
     """Runs a tree over recorded rows, in their order.
 
+    Where the demonstrator was late when the tree was learned, the same delay is undone in the
+    recorded actions first.
+
     Args:
         learned: The tree.
         demonstrations: What was recorded.  A tree of one channel is run over a recording of one
@@ -65,7 +69,10 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tup
     """
     policies = nodes.policies(learned.tree)
     lags = max((feature.lag for feature in learned.features), default=0)
-    tables = {table.channel: with_lags(table, lags) for table in tabulate(demonstrations)}
+    tables = {
+        table.channel: with_lags(shifted(table, _late(learned, table)), lags)
+        for table in tabulate(demonstrations)
+    }
     if len(policies) == len(tables) == 1:
         [(channel, policy)], [table] = policies.items(), tables.values()
         return (_replay(learned, channel, policy, table),)
@@ -79,6 +86,12 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tup
     return tuple(
         _replay(learned, channel, policies[channel], tables[channel]) for channel in common
     )
+
+
+def _late(learned: LearnedTree, table: DemonstrationTable) -> int:
+    """The rows by which the demonstrator was late when the tree was learned, in this recording."""
+    seconds, rows = learned.provenance.late_seconds, learned.provenance.late_rows
+    return rows_in(table, seconds) if seconds is not None and tells_time(table) else rows
 
 
 def _replay(

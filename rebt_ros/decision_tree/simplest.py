@@ -3,9 +3,9 @@
 CART grows a tree greedily, and where rows are few, splits that only happen to part them are as good
 to it as the ones that the demonstrator goes by.  Trees that are grown from random choices of the
 columns fit the same rows; those with the fewest leaves are the simplest explanations (Occam's
-razor), and generalize better.  Of equals the one with the longest paths is taken: it parts few rows
-from the rest at a time, and so is most like a list of rules by priority, as demonstrators have in
-mind and as behavior trees are.
+razor), and generalize better.  Of several, the one with the longest paths is taken: it parts few
+rows from the rest at a time, and so is most like a list of rules by priority, as demonstrators have
+in mind and as behavior trees are.  Where none has fewer leaves, the greedy tree stays.
 
 This is for trees that a person could read.  Large ones stand for curved borders by many small
 steps, whose number says nothing.
@@ -34,7 +34,7 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
     if fitted.leaves > _MOST_LEAVES or len(table) > _MOST_ROWS:
         return fitted
     right = fitted.right(table)
-    best, rank = fitted, _rank(table, fitted)
+    best, rank = fitted, (fitted.leaves, -np.inf)
     for number in range(_TRIES):
         for share in _SHARES:
             other = fit_again(table, fitted, number, share)

@@ -152,20 +152,9 @@ class ExecutorHandle:
 
     def _has(self, candidate: Candidate | None) -> bool:
         """Whether the tree that runs is a candidate's, by the latest report."""
-        values = self._values
-        if values is None or candidate is None:
+        if self._values is None or candidate is None:
             return False
-        named = values.get("document")
-        if named is not None:
-            return named == fingerprint(candidate.document)
-        provenance = candidate.learned.provenance
-        figures = {
-            "nodes": candidate.nodes,
-            "actions": len(candidate.learned.actions),
-            "rows": provenance.rows,
-            "own-history agreement": provenance.figures.own_history_agreement,
-        }
-        return all(values.get(key) == str(value) for key, value in figures.items())
+        return self._values.get("document") == fingerprint(candidate.document)
 
     def _on_tree(self, message: String) -> None:
         # What is published here comes back, in its order.
