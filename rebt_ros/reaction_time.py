@@ -48,6 +48,9 @@ _ROWS, _STRETCHES = 2_000, 10
 #: States alone explain late actions only if that takes at most so many times what states with
 #: previous actions take to explain actions that are not late.
 _ALONE = 1.5
+#: ... and if the delay is less than half of the time for which an action is held, with a margin.
+#: Who goes to and fro between two places turns round half a run after passing the middle.
+_HALF_A_RUN = 0.45
 #: The explanation must be smaller by that many standard errors, and by that share.
 _STANDARD_ERRORS, _SHARE = 1.0, 0.1
 
@@ -245,7 +248,9 @@ class _Explanations:
             if one.size == least:
                 return (one,), one is alone
         trials = self._around(alone, FEATURES_ALONE)
-        if min(one.size for one in trials) <= _ALONE * with_previous.size:
+        best = _peak(trials)
+        told_apart = best.rows < _HALF_A_RUN * _usual_run(self._table)
+        if told_apart and best.size <= _ALONE * with_previous.size:
             return trials, True
         return self._around(with_previous, _WITH_PREVIOUS), False
 
@@ -285,6 +290,13 @@ def _stretches(rows: IntArray) -> IntArray:
     length = _ROWS // _STRETCHES
     begins = np.linspace(0, len(rows) - length, _STRETCHES).astype(np.int64)
     return np.asarray(rows[(begins[:, None] + np.arange(length)).ravel()])
+
+
+def _usual_run(table: DemonstrationTable) -> float:
+    """Rows for which actions are held: the median over all rows."""
+    begins = np.flatnonzero(table.previous != table.chosen)
+    lengths = np.diff(np.append(begins, len(table)))
+    return float(np.median(np.repeat(lengths, lengths)))
 
 
 def _size(fitted: FittedTree) -> int:

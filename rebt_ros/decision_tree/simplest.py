@@ -7,8 +7,9 @@ razor), and generalize better.  Of several, the one with the longest paths is ta
 rows from the rest at a time, and so is most like a list of rules by priority, as demonstrators have
 in mind and as behavior trees are.  Where none has fewer leaves, the greedy tree stays.
 
-This is for trees that a person could read.  Large ones stand for curved borders by many small
-steps, whose number says nothing.
+This is for trees that a person could read, with rows enough for each leaf.  Large trees stand for
+curved borders by many small steps, whose number says nothing; and few rows are fitted by many small
+trees, most of them by chance.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from rebt_ros.demonstration.table import DemonstrationTable
 
 #: Leaves and rows up to which there is a search.
 _MOST_LEAVES, _MOST_ROWS = 30, 5_000
+_LEAST_ROWS_PER_LEAF = 10
 #: Trees that are tried for each share of the columns from which a split is chosen.
 _TRIES, _SHARES = 30, (0.3, 0.6, 0.8)
 
@@ -31,7 +33,8 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
         table: What it was fitted to, without made-up rows.
         fitted: A tree.
     """
-    if fitted.leaves > _MOST_LEAVES or len(table) > _MOST_ROWS:
+    rows, leaves = len(table), fitted.leaves
+    if leaves > _MOST_LEAVES or rows > _MOST_ROWS or rows < _LEAST_ROWS_PER_LEAF * leaves:
         return fitted
     right = fitted.right(table)
     best, rank = fitted, (fitted.leaves, -np.inf)
