@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 _ROS_ARGUMENTS = "--ros-args"
 _EPISODES = 20
 
+#: Characters of a name in the progress bar.
+_SHOWN = 30
+
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
@@ -205,9 +208,10 @@ class _Command:
             candidate = self._candidates[turn.candidate]
             if not self._settings.ask:
                 done, left = self._trial.driven, self._trial.most_left
+                rounds = self._trial.rounds
                 stage = (
-                    f"round {turn.round + 1} of {len(self._trial.rounds)}: {candidate.name} "
-                    f"{_marks(self._episodes[turn.candidate])}"
+                    f"round {turn.round + 1} of {len(rounds)}: {candidate.name[-_SHOWN:]}, "
+                    f"episode {turn.episode + 1} of {rounds[turn.round]}"
                 )
                 self._progress(stage, done / (done + left))
             episode = session.drive(candidate, turn.episode)
@@ -270,10 +274,6 @@ def _candidates(parsed: argparse.Namespace) -> Iterator[Candidate]:
     yield from of_files(parsed.trees)
     if parsed.levels is not None:
         yield from of_levels(parsed.levels)
-
-
-def _marks(episodes: Sequence[Episode]) -> str:
-    return "".join("●" if one.success else "○" for one in episodes)
 
 
 if __name__ == "__main__":

@@ -45,8 +45,8 @@ def verdict(result: TrialResult) -> str:
     name = result.candidates[best.candidate].name
     tally = best.tally
     sentence = (
-        f"{name} wins: {tally.successes} of {tally.episodes} episodes succeeded; after very many, "
-        f"{_percent(tally.interval)} would."
+        f"{name} wins: {tally.successes} of {tally.episodes} episodes succeeded "
+        f"({HEAD[-1]} {_percent(tally.interval)})."
     )
     rivals = [
         one for one in others if one.round == best.round and not tally.surely_above(one.tally)
@@ -56,7 +56,7 @@ def verdict(result: TrialResult) -> str:
     names = ", ".join(result.candidates[one.candidate].name for one in rivals)
     level = all(one.tally == tally for one in rivals)
     why = "none of these is smaller" if level else "more episodes would tell"
-    return f"{sentence} So many episodes do not tell it from {names}: {why}."
+    return f"{sentence} So few episodes do not tell it from {names}: {why}."
 
 
 def as_json(result: TrialResult) -> dict[str, Any]:
