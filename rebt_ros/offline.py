@@ -27,8 +27,8 @@ from rebt_ros.family.levels import Family, check_most_levels
 from rebt_ros.logic.conditions import Interval
 from rebt_ros.options import LearnOptions
 from rebt_ros.pipeline import Learning, Progress
-from rebt_ros.replay import Replay
-from rebt_ros.replay import replay as replay_demonstrations
+from rebt_ros.replaying import Replay
+from rebt_ros.replaying import replay as replay_demonstrations
 from rebt_ros.selection import JudgedLevels
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.inputs import InputOptions, load

@@ -17,7 +17,7 @@ from rebt_ros.errors import OptionError
 from rebt_ros.logic.conditions import IsTrue, LastActionIs, Literal
 from rebt_ros.options import LearnOptions
 from rebt_ros.pipeline import learn
-from rebt_ros.replay import replay
+from rebt_ros.replaying import replay
 
 ARM, BASE = "arm/action", "base/action"
 

@@ -27,7 +27,7 @@ from rebt_ros.errors import InputError, OptionError
 from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, Literal, Threshold
 from rebt_ros.options import LearnOptions
 from rebt_ros.pipeline import learn, learn_channels
-from rebt_ros.replay import replay
+from rebt_ros.replaying import replay
 
 #: As `some.FEATURES`, but every value can come from a topic.
 FEATURES = (*some.FEATURES[:3], replace(some.FEATURES[3], categories=("0", "1", "2")))
@@ -142,7 +142,7 @@ def test_what_was_done_because_of_the_row_before_is_learned_with_a_lag(topic: st
     assert learned.provenance.figures.own_history_agreement == 1.0
     assert learned.provenance.figures.fidelity_mismatches == 0
     tested = {one.literal.condition for one in nodes.conditions(learned.tree)}
-    assert {one.feature for one in tested if isinstance(one, Threshold)} == {"x[t-1]"}
+    assert {one.quantity for one in tested if isinstance(one, Threshold)} == {"x[t-1]"}
     assert loads(dumps(learned)) == learned
     (result,) = replay(learned, [echoing("new", 200, 2, topic), echoing("newer", 50, 3, topic)])
     assert result.own_history_agreement > 0.98

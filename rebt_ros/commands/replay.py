@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rebt_ros import offline
 from rebt_ros.commands.shell import add_input_options, aligned, input_options, run
-from rebt_ros.replay import Disagreement, Replay
+from rebt_ros.replaying import Disagreement, Replay
 
 #: Recordings whose rows lie closer have no clock, as CSV tables (seconds).
 _NO_CLOCK = 1e-3
