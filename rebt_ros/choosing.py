@@ -23,7 +23,7 @@ from rebt_ros import evaluation
 from rebt_ros.algorithms.priority_root import reduced_tree
 from rebt_ros.algorithms.re_bt_espresso import re_bt_espresso
 from rebt_ros.algorithms.rules import delta_close, leaf_rules
-from rebt_ros.arrays import IntArray
+from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.decision_tree.differences import likely_differences
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
@@ -64,6 +64,8 @@ class ChosenPolicy:
     """The pruning levels that were chosen from; None where there was no choice."""
     reasons: tuple[str, ...]
     """A sentence for each choice."""
+    of_all: FittedTree | None = None
+    """The tree of all rows, also of those that were held out; None where none was chosen by."""
 
 
 class _Steps:
@@ -82,6 +84,7 @@ def choose(
     table: DemonstrationTable,
     options: LearnOptions,
     advance: Callable[[float], None] = lambda share: None,
+    held_out: BoolArray | None = None,
 ) -> ChosenPolicy:
     """Chooses a policy.
 
@@ -89,13 +92,14 @@ def choose(
         table: By its rows alone.
         options: What is left to choose.
         advance: Told which share of the work is behind; there may be less of it.
+        held_out: Rows that have no say, shape (rows,).
 
     Raises:
         OptionError: There is no such pruning level as is asked for.
     """
     if len(table) < _FEWEST_ROWS:
         return _unjudged(table, options)
-    choice = _Choice(table, options, _Steps(advance))
+    choice = _Choice(table, options, _Steps(advance), held_out)
     vocabulary = choice.vocabulary()
     judged = choice.judged(vocabulary)
     levels = judged.levels(partial(own_history_choices, options=options, psa=False))
@@ -111,13 +115,15 @@ def choose(
     psa, reason = _choose_psa(judged, ccp_alpha, options)
     fitted = judged.fitted
     if options.simplest and options.upsample is Upsampling.NONE:
-        fitted = simplest(table, fitted)
+        fitted = simplest(choice.shown, fitted)
         if fitted is not judged.fitted:
+            # A level that is asked for is one of this tree.
+            ccp_alpha = _asked_for(fitted, options) or ccp_alpha
             reasons.append(
                 f"Of the trees that fit the rows, one with {fitted.leaves} leaves is the simplest "
                 f"({judged.fitted.leaves} where splits are chosen greedily)."
             )
-    return ChosenPolicy(fitted, ccp_alpha, psa, levels, (*reasons, reason))
+    return ChosenPolicy(fitted, ccp_alpha, psa, levels, (*reasons, reason), judged.of_all)
 
 
 def _asked_for(fitted: FittedTree, options: LearnOptions) -> float | None:
@@ -189,16 +195,24 @@ class _Choice:
     """Cross-validations of one table, each made once."""
 
     def __init__(
-        self, table: DemonstrationTable, options: LearnOptions, step: Callable[[], None]
+        self,
+        table: DemonstrationTable,
+        options: LearnOptions,
+        step: Callable[[], None],
+        held_out: BoolArray | None,
     ) -> None:
         self._table, self._options, self._step = table, options, step
-        self._telling = table if len(table) <= _LARGE else part_of(table, _ROWS_THAT_TELL)
+        self._held_out = held_out
+        self.shown = table if held_out is None else table.where(~held_out)
+        """The rows to choose by."""
+        large = len(self.shown) > _LARGE
+        self._telling = part_of(self.shown, _ROWS_THAT_TELL) if large else self.shown
         self._made: dict[tuple[bool, Vocabulary], CrossValidation] = {}
         self.reasons: list[str] = []
 
     def judged(self, vocabulary: Vocabulary, *, telling: bool = False) -> CrossValidation:
         """Of all rows, or of those that tell what a tree may test."""
-        telling = telling and len(self._telling) < len(self._table)
+        telling = telling and self._telling is not self.shown
         key = telling, vocabulary
         if key not in self._made:
             options = self._options
@@ -209,6 +223,7 @@ class _Choice:
                 random_state=options.random_state,
                 upsample=options.upsample,
                 step=self._step,
+                held_out=None if telling else self._held_out,
             )
         return self._made[key]
 

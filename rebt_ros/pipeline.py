@@ -20,7 +20,7 @@ from rebt_ros.behavior_tree.learned_tree import (
 )
 from rebt_ros.choosing import ChosenPolicy, choose, convert, own_history_choices
 from rebt_ros.decision_tree.shown_rows import shown_rows
-from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.demonstration.lags import evenly_spaced, with_lags
@@ -217,19 +217,24 @@ def learn_from(
     held_out = table.held_out(options.test_fraction)
     shown = table.where(~held_out)
     progress("choosing", _CHOOSING)
-    policy = choose(
-        shown,
-        # A level is one of the tree that is published.
-        replace(options, level=None) if options.refit else options,
-        lambda share: progress("choosing", _CHOOSING + (_JUDGING - _CHOOSING) * share),
-    )
+    # Of few rows each one counts, also for what is chosen: it is chosen once more from all.  So it
+    # is where a level is asked for, which is one of the tree that is published.
+    again = options.refit and (len(table) <= _CHOSEN_FROM_ALL or options.level is not None)
+
+    def advance(share: float) -> None:
+        progress("choosing", _CHOOSING + (_JUDGING - _CHOOSING) * share)
+
+    if options.refit and not again:
+        policy = choose(table, options, advance, held_out)
+    else:
+        policy = choose(shown, replace(options, level=None) if again else options, advance)
     progress("judging", _JUDGING)
     judge, ccp_alpha = policy.fitted, policy.ccp_alpha
     learned_from = shown
     if options.refit:
         progress("learning from all rows", _JUDGING)
         learned_from = table
-        policy = _from_all(table, options, policy)
+        policy = choose(table, options) if again else _of_all(policy, options)
         ccp_alpha = ccp_alpha if options.level is None else policy.ccp_alpha
     figures = figures_of(table.where(held_out), judge.at(ccp_alpha), options, policy.psa)
     trained = pruned(policy.fitted, policy.ccp_alpha, learned_from, options)
@@ -278,26 +283,14 @@ def reaction_time_of(table: DemonstrationTable, options: LearnOptions) -> Reacti
     return estimate(table)
 
 
-def _from_all(
-    table: DemonstrationTable, options: LearnOptions, policy: ChosenPolicy
-) -> ChosenPolicy:
-    """A policy of all rows, as chosen from them; of many rows, as chosen from those not held out.
-
-    Of few rows each one counts, also for what is chosen.
-    """
-    if len(table) <= _CHOSEN_FROM_ALL or options.level is not None:
-        return choose(table, options)
-    fitted = fit(
-        table,
-        vocabulary=policy.fitted.vocabulary,
-        max_depth=options.max_depth,
-        random_state=options.random_state,
-        upsample=options.upsample,
-    )
-    if options.ccp_alpha is not None:
-        return replace(policy, fitted=fitted)
-    # The levels of another fit lie elsewhere: what was chosen is the range from one to the next.
-    return replace(policy, fitted=fitted, ccp_alpha=policy.fitted.path.middle(policy.ccp_alpha))
+def _of_all(policy: ChosenPolicy, options: LearnOptions) -> ChosenPolicy:
+    """A policy of all rows, as chosen from those that were not held out."""
+    assert policy.of_all is not None
+    ccp_alpha = policy.ccp_alpha
+    if options.ccp_alpha is None:
+        # The levels of another fit lie elsewhere: what was chosen is the range up to the next one.
+        ccp_alpha = policy.fitted.path.middle(ccp_alpha)
+    return replace(policy, fitted=policy.of_all, ccp_alpha=ccp_alpha)
 
 
 def pruned(

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit_parts
 from rebt_ros.decision_tree.upsampling import Upsampling
@@ -126,7 +126,7 @@ def mean_recall(hits: IntArray, shown: IntArray) -> FloatArray:
 
 
 class CrossValidation:
-    """One fit to all rows and one to the rows outside each fold, all with their pruning levels.
+    """One fit to some rows and one to those outside each fold, all with their pruning levels.
 
     A level's ``ccp_alpha`` stands for the range up to the next one, at whose geometric middle the
     folds' trees are pruned.
@@ -138,6 +138,7 @@ class CrossValidation:
         random_state: Decides between equally good splits, and which rows are made up.
         upsample: Rows to fit the trees to beside those of the table; none is judged on them.
         step: Called after each tree that was fitted, and each fold in which trees were run.
+        held_out: Rows that are in no fold, and that no fold's tree is fitted to, shape (rows,).
     """
 
     def __init__(
@@ -149,15 +150,22 @@ class CrossValidation:
         random_state: int = 0,
         upsample: Upsampling = Upsampling.NONE,
         step: Callable[[], None] = lambda: None,
+        held_out: BoolArray | None = None,
     ) -> None:
         self._step = step
         self._actions = len(table.actions)
-        fold = folds(table)
-        numbers = np.unique(fold)
+        inside = np.ones(len(table), dtype=bool) if held_out is None else ~held_out
+        fold = np.full(len(table), -1)
+        fold[inside] = folds(table.where(inside))
+        numbers = np.unique(fold[inside])
         trees: list[FittedTree] = []
+        # The largest first, so that no core waits for the last one.
         for tree in fit_parts(
             table,
-            [fold != number for number in numbers],
+            [
+                *([] if held_out is None else [inside]),
+                *(inside & (fold != number) for number in numbers),
+            ],
             vocabulary=vocabulary,
             max_depth=max_depth,
             random_state=random_state,
@@ -165,7 +173,9 @@ class CrossValidation:
         ):
             trees.append(tree)
             step()
-        self.fitted, *of_folds = trees
+        self.of_all = trees[0]
+        """Fitted to all rows."""
+        self.fitted, *of_folds = trees if held_out is None else trees[1:]
         self._folds = [
             (tree, table.where(fold == number))
             for tree, number in zip(of_folds, numbers, strict=True)

@@ -12,6 +12,9 @@ from rebt_ros.trial.outcome import VoidEpisodeError
 
 _ANSWERS: Final = {"y": True, "yes": True, "n": False, "no": False}
 _AGAIN: Final = frozenset({"r", "repeat"})
+#: Bytes that are read at once.
+_MOST: Final = 4096
+
 _QUESTION: Final = "Has it succeeded? y, n, or r to drive it again: "
 
 
@@ -27,16 +30,20 @@ class AskingJudge:
         self._episodes = 0
 
     def begin(self) -> None:
-        """Waits until the robot stands at its start.
+        """Asks for the robot to be put at its start."""
+        self._episodes += 1
+        self._say(f"\nEpisode {self._episodes}: put the robot at its start, then press Enter: ")
+
+    def ready(self) -> bool:
+        """Whether Enter was pressed.
 
         Raises:
             TrialError: Nobody is there to answer.
         """
-        self._episodes += 1
-        self._say(f"\nEpisode {self._episodes}: put the robot at its start, then press Enter: ")
-        while self._line(None) is None:
-            pass
+        if self._line() is None:
+            return False
         self._say(f"It drives. {_QUESTION}")
+        return True
 
     def success(self) -> bool | None:
         """What was answered; None while nothing was.
@@ -45,7 +52,7 @@ class AskingJudge:
             TrialError: Nobody is there to answer.
             VoidEpisodeError: The episode is to be driven again.
         """
-        line = self._line(0.0)
+        line = self._line()
         if line is None:
             return None
         word = line.strip().casefold()
@@ -55,10 +62,10 @@ class AskingJudge:
             self._say(_QUESTION)
         return _ANSWERS.get(word)
 
-    def _line(self, timeout: float | None) -> str | None:
+    def _line(self) -> str | None:
         """The next line; None where there is none yet."""
-        if b"\n" not in self._typed and select.select([self._input], [], [], timeout)[0]:
-            read = os.read(self._input, 4096)
+        if b"\n" not in self._typed and select.select([self._input], [], [], 0.0)[0]:
+            read = os.read(self._input, _MOST)
             if not read:
                 raise TrialError("nobody answers any more: standard input was closed.")
             self._typed += read

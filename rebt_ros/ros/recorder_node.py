@@ -31,6 +31,7 @@ from rebt_ros.ros.recording_session import WRITE_ERROR, Answer, RecordingSession
 from rebt_ros.ros.sending_time import SendingTime, received_at
 from rebt_ros.ros.state_streams import StateStreams
 from rebt_ros.storage.recording import RecordingWriter
+from rebt_ros.storage.recording_head import Origin
 
 #: Long enough that no message of a burst is lost while the disk is slow.
 _QUEUE: Final = 5000
@@ -119,6 +120,7 @@ class RecorderNode(Node):
             ("~/record", SetBool, self._record),
             ("~/new_demonstration", Trigger, lambda _, stamp: self._session.renew(stamp)),
             ("~/discard_demonstration", Trigger, lambda _, stamp: self._session.discard(stamp)),
+            ("~/failed", Trigger, lambda _, stamp: self._session.fail(stamp)),
         ):
             self.create_service(kind, name, partial(self._serve, command), callback_group=group)
         settings = self._settings
@@ -154,17 +156,18 @@ class RecorderNode(Node):
                 "come when the recorder was stopped."
             )
         if self._session.recording:
-            answer = self._session.stop()
+            answer = self._session.stop(self._stamp(time.time_ns()))
             log = self.get_logger().info if answer.success else self.get_logger().error
             log(answer.message)
 
-    def _open_writer(self, features: tuple[Feature, ...]) -> Writer:
+    def _open_writer(self, features: tuple[Feature, ...], origin: Origin) -> Writer:
         settings = self._settings
         writer = RecordingWriter(
             settings.demonstrations,
             features,
             settings.action_topics,
             sample_rate=settings.sample_rate,
+            origin=origin,
         )
         self.get_logger().info(f"recording to {writer.path}.")
         return writer
@@ -281,7 +284,7 @@ class RecorderNode(Node):
         return response
 
     def _record(self, request: SetBool.Request, stamp: int) -> Answer:
-        return self._session.start(stamp) if request.data else self._session.stop()
+        return self._session.start(stamp) if request.data else self._session.stop(stamp)
 
     def _queue(self, place: int, take: Callable[[], object], *, waits: bool = False) -> None:
         self._order.push(place, take, time.monotonic_ns(), waits=waits)
@@ -338,12 +341,14 @@ class RecorderNode(Node):
             "rows": session.rows,
             "rows lost": session.lost,
             "takeovers": session.takeovers,
+            "failed episodes": session.failed,
             "messages": self._messages,
             "messages lost": self._lost,
             "actions that wait for their state": self._order.held,
             "paired by": "sent" if self._sending.comparable else "received",
             "demonstration": session.writer.path if session.writer else "none yet",
             "rows of the demonstration": session.writer.rows if session.writer else 0,
+            "origin of the demonstration": session.origin.value,
         }
         for topic, count in self._received.items():
             values[f"rate of {topic} (Hz)"] = f"{count / elapsed:.1f}" if elapsed else "unknown"
@@ -358,6 +363,8 @@ class RecorderNode(Node):
             return Report(Level.WARN, self._faults.recent, values)
         if silent:
             return Report(Level.WARN, f"no messages on {', '.join(silent)}", values)
+        if session.awaited:
+            return Report(Level.OK, "waiting for a person to show what failed", values)
         return Report(Level.OK, "recording", values)
 
 

@@ -15,6 +15,7 @@ from rebt_ros.demonstration.recent_states import RecentStates
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import RebtError
 from rebt_ros.ros.takeover_watch import TakeoverWatch
+from rebt_ros.storage.recording_head import Origin
 
 #: Kind of the fault that a row could not be written.
 WRITE_ERROR = "write error"
@@ -43,6 +44,9 @@ class Writer(Protocol):
     def close(self) -> None:
         """Ends the file."""
 
+    def set_aside(self) -> None:
+        """Ends the file, and keeps it where it is not learned from."""
+
     def discard(self) -> None:
         """Removes the file."""
 
@@ -67,11 +71,20 @@ class RecordingSession:
     Neither a bad message nor a full disk ends a session: the first is noted and left out; after
     the second a new demonstration begins, in a new file, once there is room again.
 
+    A correction is a demonstration of its own, and so begins without a previous action:
+
+    takeover
+        What a person does from the moment of taking over from the executor on, until that drives
+        again or a person ends it.
+    failed
+        What a person does after saying that the executor failed.  It begins with an action that
+        comes after that, whoever drives until then.
+
     Args:
         topics: State topics, in the order of their features.
         channels: Action topics.
         sample_rate: Rows per second while an action holds; None for a row per action message.
-        open_writer: Opens the file of a demonstration with these features.
+        open_writer: Opens the file of a demonstration with these features and of this origin.
         note: Told the kind and description of each fault.
 
     Raises:
@@ -83,7 +96,7 @@ class RecordingSession:
         topics: Sequence[StateTopic],
         channels: Sequence[str],
         sample_rate: float | None,
-        open_writer: Callable[[tuple[Feature, ...]], Writer],
+        open_writer: Callable[[tuple[Feature, ...], Origin], Writer],
         note: Callable[[str, str], None],
     ) -> None:
         self._topics = tuple(topics)
@@ -102,10 +115,16 @@ class RecordingSession:
         self._builder: DemonstrationBuilder | None = None
         self._writer: Writer | None = None
         self._retry_at = -math.inf
+        self.origin = Origin.DEMONSTRATION
+        """Why the demonstration under way, or the one that ended last, is or was shown."""
+        self.awaited = False
+        """Whether a person was asked to show what failed, and no row of that has come yet."""
         self.rows = 0
         """Rows written in this session."""
         self.lost = 0
         """Rows that could not be written."""
+        self.failed = 0
+        """How often the executor was said to have failed."""
         self.failure = ""
         """Why rows cannot be written at the moment; empty while they can."""
 
@@ -152,10 +171,10 @@ class RecordingSession:
 
     def act(self, stamp: int, channel: str, label: str, sent: int | None = None) -> None:
         """Takes an action message (see `DemonstrationBuilder.act`)."""
-        before = self._watch.act(stamp, channel, label)
+        before = self._watch.act(stamp, channel, label, awaited=self.awaited)
         if before is not None and self.recording:
-            self._end()
-            self._begin(stamp, before)
+            self._end(stamp)
+            self._begin(stamp, Origin.TAKEOVER, before)
         self._held[channel] = label
         if self._builder is not None:
             with self._noting_faults():
@@ -180,21 +199,46 @@ class RecordingSession:
         self._begin(stamp)
         return Answer(True, "recording: the demonstration's file is opened at its first action.")
 
-    def stop(self) -> Answer:
+    def stop(self, stamp: int) -> Answer:
         """Ends the demonstration and records no more."""
         if not self.recording:
             return Answer(True, "recording had stopped already.")
-        ended = self._end()
+        ended = self._end(stamp)
         self._builder = None
+        self.awaited = False
         return Answer(ended.success, f"stopped; {ended.message}")
 
     def renew(self, stamp: int) -> Answer:
         """Ends the demonstration and begins the next one."""
         if not self.recording:
             return Answer(False, "not recording: call ~/record with true first.")
-        ended = self._end()
+        ended = self._end(stamp)
+        self.awaited = False
         self._begin(stamp)
         return Answer(ended.success, f"{ended.message} A new demonstration has begun.")
+
+    def fail(self, stamp: int) -> Answer:
+        """The executor has failed, and a person shows next how it is done, from wherever it is.
+
+        The demonstration under way ends.  A takeover did not save the episode: it is kept, but set
+        aside, so that it is not learned from.
+        """
+        self.failed += 1
+        taken_over = self.recording and self.origin is Origin.TAKEOVER
+        if self.recording:
+            ended = self._end(stamp, aside=taken_over)
+        else:
+            # States were not taken since they were added last.
+            self._recent.clear()
+            ended = Answer(True, "recording.")
+        self._await(stamp)
+        # Soon after a takeover it drives again.
+        disable = "disable the executor, " if self._watch.driven or taken_over else ""
+        return Answer(
+            ended.success,
+            f"{ended.message} Now {disable}put the robot back to where the episode began, or leave "
+            "it where it is, and show how it is done, to the end; then call ~/new_demonstration.",
+        )
 
     def discard(self, stamp: int) -> Answer:
         """Throws the demonstration under way away and begins the next one."""
@@ -204,7 +248,10 @@ class RecordingSession:
                 "not recording: a demonstration that has ended is a file that you can delete.",
             )
         writer, self._writer = self._writer, None
-        self._begin(stamp)
+        if self.origin is Origin.FAILED:
+            self._await(stamp)
+        else:
+            self._begin(stamp)
         if writer is None:
             return Answer(True, "there was no row to discard; a new demonstration has begun.")
         try:
@@ -226,17 +273,30 @@ class RecordingSession:
             # Whether the rows before are on the disk is not known: another file begins.
             assert self._builder is not None
             self._abandon(str(err))
-            self._begin(stamp)
+            self._begin(stamp, self.origin)
 
     def _hand_over(self, stamp: int) -> None:
         """The executor drives from now on: no action is held by a person any more."""
+        if self.recording:
+            self._end(stamp)
         self._held.clear()
         if self.recording:
-            self._end()
-            self._begin(stamp)
+            self._begin(stamp, Origin.FAILED if self.awaited else Origin.DEMONSTRATION)
 
-    def _begin(self, stamp: int, before: Mapping[str, Sequence[str]] | None = None) -> None:
+    def _await(self, stamp: int) -> None:
+        """Starts a demonstration of what failed, with what a person does from now on."""
+        self._held.clear()
+        self.awaited = True
+        self._begin(stamp, Origin.FAILED)
+
+    def _begin(
+        self,
+        stamp: int,
+        origin: Origin = Origin.DEMONSTRATION,
+        before: Mapping[str, Sequence[str]] | None = None,
+    ) -> None:
         """Starts a demonstration that knows the present state, and of the past only `before`."""
+        self.origin = origin
         builder = DemonstrationBuilder(
             self._topics, self._channels, self._sample_rate, before, self._recent
         )
@@ -251,16 +311,29 @@ class RecordingSession:
                     builder.act(stamp, channel, label)
         self._builder = builder
 
-    def _end(self) -> Answer:
+    def _end(self, stamp: int, *, aside: bool = False) -> Answer:
+        """Closes the file under way, or sets it aside."""
+        if self._sample_rate is not None:
+            self._take_due(stamp)
         writer, self._writer = self._writer, None
         if writer is None:
             return Answer(True, "no rows were recorded.")
         try:
-            writer.close()
+            writer.set_aside() if aside else writer.close()
         except RebtError as err:
             self.failure = str(err)
             return Answer(False, str(err))
-        return Answer(True, f"recorded {_count(writer.rows)} in {writer.path}.")
+        rows = f"{_count(writer.rows)} in {writer.path}"
+        if aside:
+            return Answer(True, f"the takeover did not help and is set aside: {rows}.")
+        return Answer(True, f"recorded {rows}.")
+
+    def _take_due(self, stamp: int) -> None:
+        """Takes the samples that are due since the last message."""
+        assert self._builder is not None
+        for channel in self._held:
+            with contextlib.suppress(BadMessageError):
+                self._write(self._builder.act(stamp, channel, ""))
 
     @contextlib.contextmanager
     def _noting_faults(self) -> Iterator[None]:
@@ -270,11 +343,12 @@ class RecordingSession:
             self._note(err.fault.value, str(err))
 
     def _write(self, rows: Sequence[Row]) -> None:
+        self.awaited = self.awaited and not rows
         for position, row in enumerate(rows):
             if not self._written(row):
                 self.lost += len(rows) - position
                 # What comes after a gap is another demonstration: its LAT starts anew.
-                self._begin(row.stamp)
+                self._begin(row.stamp, self.origin)
                 return
 
     def _written(self, row: Row) -> bool:
@@ -284,7 +358,7 @@ class RecordingSession:
                     return False
                 assert self._builder is not None
                 assert self._builder.features is not None
-                self._writer = self._open_writer(self._builder.features)
+                self._writer = self._open_writer(self._builder.features, self.origin)
             self._writer.write(row)
         except RebtError as err:
             self._abandon(str(err))

@@ -25,6 +25,11 @@ class TakeoverWatch:
         self.takeovers = 0
         """How often a person has taken over."""
 
+    @property
+    def driven(self) -> bool:
+        """Whether the executor drives, as far as is known."""
+        return self._driven
+
     def command(self, stamp: int, channel: str, label: str) -> bool:
         """The executor has sent a command.
 
@@ -46,15 +51,23 @@ class TakeoverWatch:
         self._driven = driving
         return ended
 
-    def act(self, stamp: int, channel: str, label: str) -> Mapping[str, Sequence[str]] | None:
+    def act(
+        self, stamp: int, channel: str, label: str, *, awaited: bool = False
+    ) -> Mapping[str, Sequence[str]] | None:
         """A person has sent an action.
+
+        Args:
+            stamp: When, nanoseconds.
+            channel: Action topic it came on.
+            label: The action; empty where none is taken any longer.
+            awaited: A person was asked to show something, so that this is no takeover.
 
         Returns:
             What was done on each channel before, most recent last, where the person takes over
             with it; else None.
         """
         before = None
-        if self._driven:
+        if self._driven and not awaited:
             before = {name: history.taken for name, history in self._histories.items()}
             self.takeovers += 1
         self._driven = False

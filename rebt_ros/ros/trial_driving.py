@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Final
 
@@ -23,6 +23,8 @@ from rebt_ros.trial.settings import TrialSettings
 
 #: How often in a row somebody else's tree may come between.
 _INTRUSIONS: Final = 3
+
+_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 #: Between two looks at whether the executor is still there (seconds).
 _LOOK: Final = 1.0
@@ -74,6 +76,8 @@ class Driving:
             self._executor.give(candidate)
             start = self._world.place(number)
             self._judge.begin()
+            while not self._judge.ready():
+                self._peer.spin_once()
             try:
                 return self._attempt(start)
             except VoidEpisodeError:
@@ -170,35 +174,44 @@ def driving(
     Raises:
         RebtError: Executor or world are not there, or do not suit.
     """
-    try:
-        rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
-    except Exception as err:
-        reason = str(err).split(", at /")[0]
-        raise TrialError(f"the ROS arguments are not understood: {reason}.") from err
-    try:
-        peer = TrialPeer()
+    signals: list[int] = []
+    with _handled(lambda number, _: signals.append(number)):
         try:
-            session = Driving(peer, settings, judge)
-            try:
-                yield session
-            finally:
-                with _impatience_ignored():
-                    session.close()
+            rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
+        except Exception as err:
+            reason = str(err).split(", at /")[0]
+            raise TrialError(f"the ROS arguments are not understood: {reason}.") from err
+        try:
+            with _peer(signals) as peer:
+                session = Driving(peer, settings, judge)
+                try:
+                    yield session
+                finally:
+                    # The robot is stopped also where an impatient person presses Ctrl-C again.
+                    with _handled(signal.SIG_IGN):
+                        signals.clear()
+                        session.close()
+        except (NameValidationException, ParameterException) as err:
+            raise TrialError(f"a name is none for ROS: {' '.join(str(err).split())}.") from err
         finally:
-            peer.close()
-    except (NameValidationException, ParameterException) as err:
-        raise TrialError(f"a name is none for ROS: {' '.join(str(err).split())}.") from err
-    finally:
-        try_shutdown()
+            try_shutdown()
 
 
 @contextmanager
-def _impatience_ignored() -> Iterator[None]:
-    """A robot is stopped also where the person who wants that keeps pressing Ctrl-C."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {one: signal.signal(one, signal.SIG_IGN) for one in numbers}
+def _peer(signals: list[int]) -> Iterator[TrialPeer]:
+    peer = TrialPeer(signals)
+    try:
+        yield peer
+    finally:
+        peer.close()
+
+
+@contextmanager
+def _handled(handler: Callable[[int, object], object] | signal.Handlers) -> Iterator[None]:
+    """Has the signals that end a command handled in another way."""
+    before = {one: signal.signal(one, handler) for one in _SIGNALS}
     try:
         yield
     finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
+        for one, former in before.items():
+            signal.signal(one, former)

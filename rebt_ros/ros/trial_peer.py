@@ -24,10 +24,16 @@ _NAP: Final = 0.02
 
 
 class TrialPeer(Node):
-    """Spins only while it waits."""
+    """Spins only while it waits; all that waits raises KeyboardInterrupt when a signal has come.
 
-    def __init__(self) -> None:
+    Args:
+        signals: Those that have come; an exception that is raised by a signal itself would leave
+            rclpy in the middle of something.
+    """
+
+    def __init__(self, signals: list[int]) -> None:
         super().__init__("trial")
+        self._signals = signals
         self._spinner = SingleThreadedExecutor(context=self.context)
         self._spinner.add_node(self)
 
@@ -46,6 +52,9 @@ class TrialPeer(Node):
     def spin_once(self) -> None:
         """Takes what has come, or waits a moment for it."""
         self._spinner.spin_once(timeout_sec=_NAP)
+        if self._signals:
+            self._signals.clear()
+            raise KeyboardInterrupt
 
     def wait(self, condition: Callable[[], object], timeout: float) -> bool:
         """Waits until a condition holds.

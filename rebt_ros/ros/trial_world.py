@@ -151,8 +151,12 @@ class TopicJudge:
         self._peer.create_subscription(kind, self._topic, self._heard.append, qos)
 
     def begin(self) -> None:
-        """Forgets what came late."""
+        """Forgets what it has heard before."""
         self._heard.clear()
+
+    def ready(self) -> bool:
+        """Always."""
+        return True
 
     def success(self) -> bool | None:
         """The first word since the episode began.
@@ -171,6 +175,10 @@ class SilentJudge:
 
     def begin(self) -> None:
         """Does nothing."""
+
+    def ready(self) -> bool:
+        """Always."""
+        return True
 
     def success(self) -> bool | None:
         """Not known before the reset."""

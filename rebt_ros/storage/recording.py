@@ -27,6 +27,7 @@ from rebt_ros.storage.recording_head import (
     LONGEST_LINE,
     MARK,
     TEXT_VERSION,
+    Origin,
     head_line,
     read_head,
 )
@@ -38,6 +39,9 @@ SUFFIX: Final = ".rec"
 
 #: Of version 1.
 _TEXT_SUFFIX: Final = ".csv"
+
+#: Follows the name of a recording that is kept, but not learned from.
+ASIDE: Final = ".failed"
 
 
 class RecordingError(StorageError):
@@ -52,6 +56,7 @@ class RecordingWriter:
         features: Columns of the state.
         channels: Action topics that rows may come on.
         sample_rate: Rows per second and channel if the demonstration is sampled, else None.
+        origin: Why it was shown.
 
     Raises:
         RecordingError: The file cannot be created.
@@ -69,6 +74,7 @@ class RecordingWriter:
         channels: Sequence[str],
         *,
         sample_rate: float | None = None,
+        origin: Origin = Origin.DEMONSTRATION,
     ) -> None:
         if not features:
             raise ValueError("a recording needs at least one feature")
@@ -88,7 +94,7 @@ class RecordingWriter:
                 "name a directory with room where you may write."
             ) from err
         try:
-            self._append(head_line(features, channels, sample_rate))
+            self._append(head_line(features, channels, sample_rate, origin))
         except RecordingError:
             self.discard()
             raise
@@ -150,6 +156,26 @@ class RecordingWriter:
             descriptor, self._descriptor = self._descriptor, None
             with contextlib.suppress(OSError):
                 os.close(descriptor)
+
+    def set_aside(self) -> None:
+        """Ends the recording like `close`, under a name that `recordings` passes over.
+
+        Raises:
+            RecordingError: The disk refused to keep what was written, or the name to be changed.
+        """
+        if self._descriptor is None:
+            return
+        self.close()
+        if self.rows == 0:
+            return
+        aside = self.path.with_name(self.path.name + ASIDE)
+        try:
+            self.path.rename(aside)
+        except OSError as err:
+            raise RecordingError(
+                f"{self.path} cannot be set aside ({err.strerror or err}): move it elsewhere."
+            ) from err
+        self.path = aside
 
     def discard(self) -> None:
         """Ends the recording and removes its file.

@@ -8,9 +8,11 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import BinaryIO, Final
 
+from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError
 
@@ -27,6 +29,20 @@ LONGEST_LINE: Final = 1 << 24
 #: The rows of version 2 begin at a multiple of this many bytes.
 _ALIGNMENT: Final = 64
 
+#: Sample rates beyond are none (rows per second).
+_LARGEST_RATE: Final = 1e9
+
+
+class Origin(Enum):
+    """Why a demonstration was shown."""
+
+    DEMONSTRATION = "demonstration"
+    """Of a person's own accord; also where nothing is said, as in older recordings."""
+    TAKEOVER = "takeover"
+    """A person took over from the executor: the rest of an episode that it had begun."""
+    FAILED = "failed"
+    """The executor had failed: the same again, as it should have been done."""
+
 
 @dataclass(frozen=True, slots=True)
 class Head:
@@ -35,6 +51,14 @@ class Head:
     version: int
     features: tuple[Feature, ...]
     channels: tuple[str, ...]
+    sample_rate: float | None = None
+    """Rows per second and channel; None for a row per action message."""
+    origin: Origin = Origin.DEMONSTRATION
+
+    @property
+    def row_kind(self) -> RowKind:
+        """What a row is."""
+        return RowKind.EVENT if self.sample_rate is None else RowKind.SAMPLE
 
     @classmethod
     def parse(cls, text: str) -> Head:
@@ -63,16 +87,22 @@ class Head:
         read = tuple(map(_parse_feature, features))
         if len({feature.name for feature in read}) < len(read):
             raise ValueError("two features have the same name")
-        return cls(version, read, tuple(channels))
+        sample_rate = _parse_sample_rate(values.get("sample_rate"))
+        origin = _parse_origin(values.get("origin", Origin.DEMONSTRATION.value))
+        return cls(version, read, tuple(channels), sample_rate, origin)
 
 
 def head_line(
-    features: Sequence[Feature], channels: Sequence[str], sample_rate: float | None
+    features: Sequence[Feature],
+    channels: Sequence[str],
+    sample_rate: float | None,
+    origin: Origin = Origin.DEMONSTRATION,
 ) -> bytes:
     """The first line of a recording of version 2."""
     description = {
         "version": VERSION,
         "sample_rate": sample_rate,
+        "origin": origin.value,
         "features": [
             {"name": feature.name, "topic": feature.topic, "index": feature.index}
             for feature in features
@@ -99,6 +129,26 @@ def read_head(path: Path, file: BinaryIO) -> Head:
             f"{path} is a recording that cannot be read, because {err}: "
             "use the version of rebt_ros that wrote it."
         ) from err
+
+
+def _parse_sample_rate(value: object) -> float | None:
+    if value is None:
+        return None
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        # Python's JSON also knows NaN and Infinity.
+        or not 0 < value <= _LARGEST_RATE
+    ):
+        raise ValueError(f"its sample rate is {value!r}, not null or a positive number")
+    return float(value)
+
+
+def _parse_origin(value: object) -> Origin:
+    for one in Origin:
+        if value == one.value:
+            return one
+    raise ValueError(f"its origin is {value!r}, not {', '.join(one.value for one in Origin)}")
 
 
 def _parse_feature(value: object) -> Feature:

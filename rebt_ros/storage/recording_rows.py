@@ -234,6 +234,7 @@ class _Columns:
                 for channel, last in self._before.items()
                 if last
             },
+            self._head.row_kind,
         )
 
     def _add_label(self, number: int, content: bytes, size: int) -> None:

@@ -38,7 +38,9 @@ def read_text_rows(path: Path, file: BinaryIO, head: Head) -> Read:
             "features of line 1: restore the line."
         )
     lines = _Lines(file)
-    demonstration = Demonstration.from_rows(path.name, head.features, _rows(path, head, lines))
+    demonstration = Demonstration.from_rows(
+        path.name, head.features, _rows(path, head, lines), head.row_kind
+    )
     _check_values(path, demonstration)
     notes = ("its last line is incomplete and left out",) if lines.torn else ()
     return Read(demonstration, notes)

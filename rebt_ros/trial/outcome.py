@@ -35,7 +35,14 @@ class Judge(Protocol):
     """Says how episodes go."""
 
     def begin(self) -> None:
-        """Is told that the next episode is about to begin."""
+        """Is told that the next episode is to begin."""
+
+    def ready(self) -> bool:
+        """Whether it may begin; asked again and again until that is so.
+
+        Raises:
+            RebtError: Nobody is there to say so.
+        """
 
     def success(self) -> bool | None:
         """Whether the episode has succeeded; None while that is not known.
