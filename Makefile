@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench bench-reduction bench-recorder experiment fuzz soak lint format clean
+.PHONY: help setup build demo test bench bench-driving bench-reduction bench-recorder experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -54,6 +54,9 @@ bench: setup ## Measure us and the limit in turn, for docs/performance.md (ARGS=
 
 bench-reduction: setup ## Compare the sizes of BT-Espresso's trees and ours (ARGS="..." for options).
 	@$(VENV_PYTHON) -m rebt_ros.commands.bench_reduction ../shared/experiments $(ARGS)
+
+bench-driving: setup ## Let what is learned drive, beside plain learners (ARGS="corrections", "--late 2", ...).
+	@PYTHONPATH=.:test/benchmarks:$$PYTHONPATH $(VENV_PYTHON) -m driving $(ARGS)
 
 bench-recorder: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 bench-recorder: setup ## Kill, load and measure the recorder (KILLS=50; ARGS="..." for options).

@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 from glob import glob
+from platform import machine
 
 from setuptools import find_packages, setup
 from setuptools.command.install_scripts import install_scripts
@@ -67,6 +68,8 @@ setup(
     ],
     extras_require={
         "cluster": ["distributed>=2023.5", "joblib>=1.4"],
+        # Box2D has wheels for one kind of processor; without it one task of many is left out.
+        "driving": [f"gymnasium{'[box2d]' * (machine() == 'x86_64')}>=1", "minigrid>=3"],
         "pictures": ["matplotlib>=3.6"],
         "test": ["hypothesis", "jsonschema>=4.10", "pytest", "pytest-xdist>=3"],
         "upsampling": ["imbalanced-learn>=0.12"],
@@ -80,6 +83,7 @@ setup(
             f"learn = {PACKAGE}.commands.learn:main",
             f"replay = {PACKAGE}.commands.replay:main",
             f"simulate = {PACKAGE}.commands.simulate:main",
+            f"trial = {PACKAGE}.commands.trial:main",
             *(f"{node} = {PACKAGE}.ros.entry:{node}" for node in NODES),
         ],
     },

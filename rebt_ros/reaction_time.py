@@ -293,10 +293,10 @@ def _stretches(rows: IntArray) -> IntArray:
 
 
 def _usual_run(table: DemonstrationTable) -> float:
-    """Rows from the first to the last one of an action that is held: the median over all rows."""
+    """Rows from the first to the last one of an action that is held: the mean over all rows."""
     begins = np.flatnonzero(table.previous != table.chosen)
     lengths = np.diff(np.append(begins, len(table)))
-    return float(np.median(np.repeat(lengths, lengths))) - 1
+    return float(np.sum(lengths**2) / np.sum(lengths)) - 1
 
 
 def _size(fitted: FittedTree) -> int:

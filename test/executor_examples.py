@@ -16,6 +16,7 @@ from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
 from rebt_ros.behavior_tree.nodes import Action, Condition, Node, Selector, Sequence, actions
 from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import Literal, Threshold
 
@@ -34,7 +35,7 @@ def learned(tree: Node, topic: str | None = "state", *others: Action) -> Learned
         ),
         (*actions(tree), *others),
         tree,
-        Provenance(1, 10, 0.0, 5, 0.0, Root.SELECTOR, False, Figures(0, 1.0, 1.0, 2)),
+        Provenance(1, 10, 0.0, 5, 0.0, Root.SELECTOR, History.NONE, Figures(0, 1.0, 1.0, 2)),
     )
 
 

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import (
+    ChannelProvenance,
     Figures,
     LearnedTree,
     Provenance,
@@ -24,16 +25,23 @@ from rebt_ros.behavior_tree.learned_tree import (
     SuggestionKind,
 )
 from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
+from rebt_ros.decision_tree.encoding import Vocabulary
+from rebt_ros.demonstration.demonstration import RowKind
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import LARGEST_LAG, Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import (
     Condition,
+    Difference,
     HasCategory,
     Interval,
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
+    Quantity,
     Threshold,
+    features_of,
 )
 from rebt_ros.logic.dnf import Conjunction, Dnf, conditions_of
 
@@ -44,19 +52,26 @@ FEATURES = (
     Feature("docked", FeatureKind.BINARY),
     Feature("kind", FeatureKind.CATEGORICAL, ("box", "cup", "tool")),
 )
+#: What remains to be driven with the charge that is left, say.
+DIFFERENCE = Difference("distance", "battery")
+#: What trees may test beside `FEATURES`.
+LAT, PREVIOUS = Vocabulary(History.LAST), Vocabulary(History.PREVIOUS)
+EVERYTHING = Vocabulary(History.PREVIOUS, (DIFFERENCE,))
 LABELS = ("go", "grasp", "turn", "wait")
 ACTIONS = tuple(nodes.Action(label, CHANNEL) for label in LABELS)
 #: Tenths are not exact in binary.
 THRESHOLDS = (-0.5, 0.0, 0.1, 0.2, 0.3, 0.5)
 
-PROVENANCE = Provenance(1, 1, 0.3, None, 0.0, Root.SELECTOR, True, Figures(0, None, None, 0))
+PROVENANCE = Provenance(
+    1, 1, 0.3, None, 0.0, Root.SELECTOR, History.LAST, Figures(0, None, None, 0)
+)
 
 
 # --- small builders ---------------------------------------------------------------------------
 
 
-def at_most(feature: str, value: float) -> Literal:
-    return Literal(Threshold(feature, value))
+def at_most(quantity: Quantity, value: float) -> Literal:
+    return Literal(Threshold(quantity, value))
 
 
 def conjunction(*literals: Literal) -> Conjunction:
@@ -76,10 +91,14 @@ def when(*literals: Literal, then: nodes.Node) -> nodes.Sequence:
     return nodes.Sequence((*map(nodes.Condition, literals), then))
 
 
-def learned(tree: nodes.Node, features: Sequence[Feature] = FEATURES) -> LearnedTree:
+def learned(
+    tree: nodes.Node,
+    features: Sequence[Feature] = FEATURES,
+    row_kind: RowKind = RowKind.EVENT,
+) -> LearnedTree:
     """The tree over the small vocabulary, and over any other action that it takes."""
     actions = dict.fromkeys((*ACTIONS, *nodes.actions(tree)))
-    return LearnedTree(tuple(features), tuple(actions), tree, PROVENANCE)
+    return LearnedTree(tuple(features), tuple(actions), tree, PROVENANCE, row_kind=row_kind)
 
 
 def table(
@@ -106,18 +125,29 @@ def table(
 # --- what conditions mean ---------------------------------------------------------------------
 
 
-def holds(literal: Literal, state: Sequence[float], last_action: str | None = None) -> bool:
+def holds(
+    literal: Literal,
+    state: Sequence[float],
+    last_action: str | None = None,
+    previous: str | None = None,
+) -> bool:
     """Whether a literal over `FEATURES` holds, read from the definitions alone."""
-    return _satisfied(literal.condition, state, last_action) is literal.positive
+    return _satisfied(literal.condition, state, last_action, previous) is literal.positive
 
 
-def _satisfied(condition: Condition, state: Sequence[float], last_action: str | None) -> bool:
-    if isinstance(condition, LastActionIs):
-        return last_action == condition.action
-    place = [feature.name for feature in FEATURES].index(condition.feature)
-    value = state[place]
-    if math.isnan(value):
+def _satisfied(
+    condition: Condition, state: Sequence[float], last_action: str | None, previous: str | None
+) -> bool:
+    match condition:
+        case LastActionIs(action=action):
+            return last_action == action
+        case PreviousActionIs(action=action):
+            return previous == action
+    places = [[feature.name for feature in FEATURES].index(name) for name in features_of(condition)]
+    values = [state[place] for place in places]
+    if any(map(math.isnan, values)):
         return False
+    value = values[0] - values[1] if len(values) == 2 else values[0]
     match condition:
         case Threshold(value=threshold):
             return value <= threshold
@@ -126,7 +156,7 @@ def _satisfied(condition: Condition, state: Sequence[float], last_action: str | 
         case IsTrue():
             return value == 1
         case HasCategory(category=category):
-            return FEATURES[place].categories[int(value)] == category
+            return FEATURES[places[0]].categories[int(value)] == category
 
 
 def truth(rule: Dnf, true: frozenset[Condition] | set[Condition]) -> bool:
@@ -144,15 +174,19 @@ def assignments(*rules: Dnf) -> Iterator[frozenset[Condition]]:
 # --- logic ------------------------------------------------------------------------------------
 
 
-def thresholds(feature: str | None = None) -> st.SearchStrategy[Threshold]:
-    names = st.sampled_from(("distance", "battery")) if feature is None else st.just(feature)
-    return st.builds(Threshold, names, st.sampled_from(THRESHOLDS))
+#: Numeric features, and what differs between them.
+quantities: st.SearchStrategy[Quantity] = st.sampled_from(("distance", "battery", DIFFERENCE))
 
 
-def intervals(feature: str | None = None) -> st.SearchStrategy[Interval]:
-    names = st.sampled_from(("distance", "battery")) if feature is None else st.just(feature)
+def thresholds(quantity: Quantity | None = None) -> st.SearchStrategy[Threshold]:
+    compared = quantities if quantity is None else st.just(quantity)
+    return st.builds(Threshold, compared, st.sampled_from(THRESHOLDS))
+
+
+def intervals(quantity: Quantity | None = None) -> st.SearchStrategy[Interval]:
+    compared = quantities if quantity is None else st.just(quantity)
     ends = st.sampled_from(tuple(itertools.combinations(THRESHOLDS, 2)))
-    return st.builds(lambda name, between: Interval(name, *between), names, ends)
+    return st.builds(lambda its, between: Interval(its, *between), compared, ends)
 
 
 def last_actions(deciding: bool = True) -> st.SearchStrategy[LastActionIs]:
@@ -160,17 +194,18 @@ def last_actions(deciding: bool = True) -> st.SearchStrategy[LastActionIs]:
     return st.builds(LastActionIs, st.sampled_from(LABELS), groups.map(tuple))
 
 
-def conditions(
-    last_action: bool = True, deciding: bool = True
-) -> st.SearchStrategy[Threshold | Interval | IsTrue | HasCategory | LastActionIs]:
-    """Conditions on `FEATURES` and, unless told otherwise, LAT."""
+previous_actions = st.builds(PreviousActionIs, st.sampled_from(LABELS))
+
+
+def conditions(history: bool = True, deciding: bool = True) -> st.SearchStrategy[Condition]:
+    """Conditions on `FEATURES` and, unless told otherwise, on what was done before."""
     kinds: list[st.SearchStrategy[Condition]] = [
         thresholds(),
         intervals(),
         st.just(IsTrue("docked")),
         st.sampled_from(FEATURES[3].categories).map(lambda name: HasCategory("kind", name)),
     ]
-    return st.one_of(*kinds, *([last_actions(deciding)] if last_action else []))
+    return st.one_of(*kinds, *([last_actions(deciding), previous_actions] if history else []))
 
 
 def literals(
@@ -198,7 +233,7 @@ def dnfs(
     ).map(lambda drawn: Dnf(tuple(drawn)))
 
 
-#: Six conditions: all their assignments can be looked at.
+#: Nine conditions: all their assignments can be looked at.
 few_conditions = st.sampled_from(
     (
         Threshold("distance", 0.1),
@@ -207,11 +242,17 @@ few_conditions = st.sampled_from(
         IsTrue("docked"),
         HasCategory("kind", "cup"),
         LastActionIs("go", ("turn",)),
+        Threshold(DIFFERENCE, 0.0),
+        Threshold(DIFFERENCE, 0.3),
+        PreviousActionIs("go"),
     )
 )
 
 #: Thresholds only, as float reduction is about them.
 threshold_dnfs = dnfs(st.one_of(thresholds(), thresholds("distance"), st.just(IsTrue("docked"))))
+
+
+vocabularies = st.builds(Vocabulary, st.sampled_from(History), st.sampled_from(((), (DIFFERENCE,))))
 
 
 # --- states and tables ------------------------------------------------------------------------
@@ -325,11 +366,15 @@ def _conditions_on(
             LastActionIs,
             st.sampled_from(labels),
             st.lists(st.sampled_from(labels), max_size=2).map(tuple),
-        )
+        ),
+        st.builds(PreviousActionIs, st.sampled_from(labels)),
     ]
+    called = [one.name for one in declared]
+    compared: list[Quantity] = [*called, *itertools.starmap(Difference, _pairs(called))]
+    for quantity in compared:
+        kinds.append(st.builds(Threshold, st.just(quantity), finite))
+        kinds.append(ends.map(lambda between, its=quantity: Interval(its, *between)))
     for one in declared:
-        kinds.append(st.builds(Threshold, st.just(one.name), finite))
-        kinds.append(ends.map(lambda between, name=one.name: Interval(name, *between)))
         kinds.append(st.just(IsTrue(one.name)))
         if one.categories:
             category = st.sampled_from(one.categories)
@@ -337,23 +382,41 @@ def _conditions_on(
     return st.one_of(kinds)
 
 
+def _pairs(called: Sequence[str]) -> list[tuple[str, str]]:
+    return list(itertools.permutations(called, 2))
+
+
 shares = st.floats(0, 1)
+figures = st.builds(
+    Figures,
+    fidelity_mismatches=st.integers(0, 10**9),
+    teacher_forced_agreement=st.none() | shares,
+    own_history_agreement=st.none() | shares,
+    held_out_rows=st.integers(0, 10**9),
+    mean_recall=st.none() | shares,
+)
+ccp_alphas = st.floats(0, allow_nan=False, allow_infinity=False)
+channel_provenances = st.builds(
+    ChannelProvenance,
+    channel=names,
+    rows=st.integers(0, 10**30),
+    ccp_alpha=ccp_alphas,
+    history=st.sampled_from(History),
+    figures=figures,
+)
 provenances = st.builds(
     Provenance,
     demonstrations=st.integers(0, 10**9),
     rows=st.integers(0, 10**30),
     delta=shares,
     max_depth=st.none() | st.integers(1, 100),
-    ccp_alpha=st.floats(0, allow_nan=False, allow_infinity=False),
+    ccp_alpha=ccp_alphas,
     root=st.sampled_from(Root),
-    uses_last_action=st.booleans(),
-    figures=st.builds(
-        Figures,
-        fidelity_mismatches=st.integers(0, 10**9),
-        teacher_forced_agreement=st.none() | shares,
-        own_history_agreement=st.none() | shares,
-        held_out_rows=st.integers(0, 10**9),
-    ),
+    history=st.sampled_from(History),
+    figures=figures,
+    channels=st.lists(channel_provenances, max_size=2).map(tuple),
+    late_rows=st.integers(0, 10**6),
+    late_seconds=st.none() | ccp_alphas,
 )
 
 
@@ -383,6 +446,7 @@ def learned_trees(draw: st.DrawFn) -> LearnedTree:
         draw(provenances),
         tuple(draw(st.lists(suggestions, max_size=2))),
         tuple(draw(st.lists(shown, max_size=2))),
+        draw(st.sampled_from(RowKind)),
     )
 
 

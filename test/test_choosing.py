@@ -1,4 +1,4 @@
-"""Choosing the pruning level, LAT and PSA nodes, and the reasons that are given for it."""
+"""Choosing the pruning level, the history, differences and PSA nodes, and the reasons given."""
 
 from __future__ import annotations
 
@@ -7,18 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import strategies as some
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rebt_ros import evaluation
+from rebt_ros.algorithms.re_bt_espresso import re_bt_espresso
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.choosing import choose, convert, own_history_choices
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
+from rebt_ros.decision_tree.training import fit, train
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import OptionError
+from rebt_ros.logic.conditions import Difference
 from rebt_ros.options import LearnOptions, Use
-from rebt_ros.selection import JudgedLevels, folds
+from rebt_ros.selection import CrossValidation, JudgedLevels, folds
 
 
 def table(
@@ -46,25 +51,80 @@ def noisy(rows: int = 400) -> DemonstrationTable:
     return table(numbers.tolist(), ["turn" if one else "go" for one in turns])
 
 
-def judged(scores: list[list[float]]) -> JudgedLevels:
-    return JudgedLevels(np.arange(len(scores[0]), dtype=float), np.array(scores))
+# --- the level ----------------------------------------------------------------------------------
 
 
-def test_the_smallest_tree_within_one_standard_error_of_the_best_is_chosen() -> None:
-    # Means 0.9, 0.92, 0.9 and 0.5; the best has a standard error of 0.02.
-    levels = judged([[0.9, 0.94, 0.9, 0.5], [0.9, 0.9, 0.91, 0.5]])
+def judged(hits: list[list[list[int]]], shown: list[list[int]]) -> JudgedLevels:
+    """Levels by the rows of each action that each one hits in each fold."""
+    return JudgedLevels(np.arange(len(hits[0]), dtype=float), np.array(hits), np.array(shown))
+
+
+def test_a_rare_action_counts_as_much_as_a_frequent_one() -> None:
+    levels = judged([[[90, 0], [80, 10], [85, 4]]], [[90, 10]])
+    assert levels.mean_recalls == pytest.approx([0.5, (80 / 90 + 1) / 2, (85 / 90 + 0.4) / 2])
     assert levels.best == 1
-    assert levels.standard_errors[1] == pytest.approx(0.02)
-    assert levels.chosen == 2
+    # Agreement says otherwise of the first two.
+    assert levels.means == pytest.approx([0.9, 0.9, 0.89])
 
 
-def test_a_level_further_than_one_standard_error_is_not_chosen() -> None:
-    assert judged([[0.9, 0.93, 0.8, 0.5], [0.9, 0.92, 0.8, 0.5]]).chosen == 1
+def test_recall_is_over_the_rows_of_all_folds_and_of_actions_that_were_shown() -> None:
+    # The first action stands in one fold only, and the last one in none.
+    levels = judged([[[0, 4, 0], [0, 2, 0]], [[3, 1, 0], [6, 5, 0]]], [[0, 4, 0], [6, 6, 0]])
+    np.testing.assert_allclose(levels.recalls, [[0.5, 0.5, np.nan], [1.0, 0.7, np.nan]])
+    assert levels.mean_recalls == pytest.approx([0.5, 0.85])
+    assert levels.scores.tolist() == [[1.0, 0.5], [4 / 12, 11 / 12]]
 
 
-def test_one_action_for_everything_is_chosen_only_where_it_is_best() -> None:
-    assert judged([[0.5, 0.6, 0.55], [0.7, 0.6, 0.62]]).chosen == 1
-    assert judged([[0.5, 0.6, 0.7], [0.5, 0.6, 0.7]]).chosen == 2
+def test_of_levels_with_the_same_recall_the_largest_tree_is_the_best() -> None:
+    levels = judged([[[5, 4], [4, 5], [5, 4], [3, 3]]], [[10, 10]])
+    assert levels.best == 0
+    # The same shares, added up in another order.
+    thirds = judged(
+        [[[1, 2], [2, 1]], [[2, 1], [1, 2]], [[1, 0], [1, 0]]], [[3, 3], [3, 3], [1, 3]]
+    )
+    assert thirds.best == 0
+
+
+def test_the_best_level_is_chosen_where_every_fold_is_clear_about_it() -> None:
+    fold = [[6, 6], [7, 7], [5, 5]]
+    levels = judged([fold, fold, fold], [[10, 10]] * 3)
+    assert levels.best == levels.chosen == 1
+
+
+def test_a_larger_tree_that_is_worse_in_a_single_fold_is_clearly_worse() -> None:
+    fold = [[8, 8], [8, 8]]
+    levels = judged([fold, [[7, 8], [8, 8]], fold, fold], [[10, 10]] * 4)
+    assert levels.best == levels.chosen == 1
+
+
+def test_of_trees_that_folds_disagree_about_the_largest_is_chosen() -> None:
+    levels = judged([[[6, 6], [8, 8]], [[8, 8], [7, 7]]], [[10, 10]] * 2)
+    assert levels.best == 1
+    assert levels.chosen == 0
+
+
+counts = st.integers(0, 20)
+
+
+@given(st.integers(1, 5), st.integers(1, 6), st.data())
+def test_no_tree_smaller_than_the_best_is_chosen_and_none_that_every_fold_speaks_against(
+    folds: int, levels: int, data: st.DataObject
+) -> None:
+    shown = np.full((folds, 3), 20)
+    hits = np.array(
+        data.draw(
+            st.lists(counts, min_size=folds * levels * 3, max_size=folds * levels * 3), label="hits"
+        )
+    ).reshape(folds, levels, 3)
+    result = JudgedLevels(np.arange(levels, dtype=float), hits, shown)
+    recalls = (hits / 20).mean(axis=(0, 2))
+    assert result.mean_recalls == pytest.approx(recalls)
+    assert recalls[result.best] == pytest.approx(recalls.max())
+    assert not (recalls[: result.best] > recalls.max() - 1e-9).any()
+    assert result.chosen <= result.best
+    sums = hits.sum(axis=2)
+    apart = sums[:, result.best] - sums[:, result.chosen]
+    assert result.chosen == result.best or apart.min() < apart.max()
 
 
 def test_folds_are_whole_demonstrations_or_stretches_of_the_only_one() -> None:
@@ -74,6 +134,50 @@ def test_folds_are_whole_demonstrations_or_stretches_of_the_only_one() -> None:
     assert several.tolist() == [0, 0, 1, 1, 1, 2]
     many = folds(table([0.0] * 12, ["a"] * 12, list(range(12))))
     assert many.tolist() == [0, 0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4]
+
+
+@settings(max_examples=25, deadline=None)
+@given(some.tables(min_rows=20, max_rows=40), st.sampled_from((some.PREVIOUS, some.EVERYTHING)))
+def test_levels_are_judged_by_trees_that_were_not_shown_a_fold_after_what_the_demonstrator_did(
+    table: DemonstrationTable, vocabulary: Vocabulary
+) -> None:
+    levels = CrossValidation(table, vocabulary=vocabulary).levels(lambda trained, rows: NOBODY)
+    alphas = fit(table, vocabulary=vocabulary).path.alphas
+    assert levels.ccp_alphas.tolist() == alphas.tolist()
+    middles = np.sqrt(alphas * np.append(alphas[1:], alphas[-1]))
+    number = folds(table)
+    for place, fold in enumerate(np.unique(number)):
+        rows = table.where(number == fold)
+        # Each row keeps the previous action that it has in the whole table.
+        assert rows.previous.tolist() == table.previous[number == fold].tolist()
+        fitted = fit(table.where(number != fold), vocabulary=vocabulary)
+        for level, middle in enumerate(middles):
+            right = fitted.at(middle).predict(rows) == rows.chosen
+            wanted = np.bincount(rows.chosen[right], minlength=len(table.actions))
+            assert levels.hits[place, level].tolist() == wanted.tolist()
+        assert levels.shown[place].tolist() == np.bincount(rows.chosen, minlength=4).tolist()
+
+
+@settings(max_examples=25, deadline=None)
+@given(some.tables(min_rows=24, max_rows=40), some.vocabularies, st.floats(0.1, 0.5))
+def test_rows_that_are_held_out_have_no_say_but_are_in_the_tree_of_all_rows(
+    table: DemonstrationTable, vocabulary: Vocabulary, fraction: float
+) -> None:
+    held_out = table.held_out(fraction)
+    shown = table.where(~held_out)
+    assume(len(shown) > 1)
+    judge = CrossValidation(table, vocabulary=vocabulary, held_out=held_out)
+    alone = CrossValidation(shown, vocabulary=vocabulary)
+    levels, wanted = judge.teacher_forced(), alone.teacher_forced()
+    assert levels.ccp_alphas.tolist() == wanted.ccp_alphas.tolist()
+    assert levels.hits.tolist() == wanted.hits.tolist()
+    assert levels.shown.tolist() == wanted.shown.tolist()
+    assert judge.fitted.at(0.0).tree == alone.fitted.at(0.0).tree
+    assert judge.of_all.at(0.0).tree == fit(table, vocabulary=vocabulary).at(0.0).tree
+
+
+#: What nothing is chosen by.
+NOBODY = np.empty(0, dtype=np.int64)
 
 
 def test_noise_is_pruned_away() -> None:
@@ -95,6 +199,7 @@ def test_few_rows_are_reproduced_instead_of_pruned() -> None:
     policy = choose(few, LearnOptions())
     assert policy.ccp_alpha == 0.0
     assert policy.levels is None
+    assert policy.fitted.vocabulary == FEATURES_ALONE
     assert (policy.fitted.at(0.0).predict(few) == few.chosen).all()
     assert "too few" in policy.reasons[0]
 
@@ -105,13 +210,151 @@ def test_choosing_is_the_same_every_time() -> None:
     assert first.reasons == second.reasons
 
 
+def test_a_level_that_is_asked_for_is_used() -> None:
+    rows = noisy()
+    fitted = choose(rows, LearnOptions()).fitted
+    alphas = fitted.path.alphas
+    for level in (0, 3, len(alphas) - 1):
+        policy = choose(rows, LearnOptions(level=level))
+        assert policy.ccp_alpha == alphas[level]
+        leaves = policy.fitted.at(policy.ccp_alpha).tree.leaves
+        assert leaves == policy.fitted.path.leaf_counts()[level]
+    with pytest.raises(OptionError, match=f"no pruning level {len(alphas)}: the last one is"):
+        choose(rows, LearnOptions(level=len(alphas)))
+
+
+def test_a_level_is_one_of_the_simplest_tree_where_that_is_another_one() -> None:
+    # Turns where one of two values is low and not both; the third one differs by chance.
+    sides = np.tile([(0, 0), (0, 1), (1, 0), (1, 1)], (50, 1)).astype(float)
+    by_chance = np.random.default_rng(4).integers(0, 2, 200)
+    labels = np.where(sides[:, 0] != sides[:, 1], "turn", "go").tolist()
+    rows = replace(
+        table(sides[:, 0].tolist(), labels),
+        features=(Feature("x"), Feature("y"), Feature("z")),
+        states=np.column_stack([sides, by_chance]),
+    )
+    options = LearnOptions(differences=Use.NEVER, history=History.NONE)
+    greedy = choose(rows, replace(options, simplest=False)).fitted
+    policy = choose(rows, options)
+    assert policy.fitted.leaves < greedy.leaves
+    assert any("is the simplest" in reason for reason in policy.reasons)
+    for level, leaves in enumerate(policy.fitted.path.leaf_counts().tolist()):
+        asked = choose(rows, replace(options, level=level))
+        assert asked.fitted.at(asked.ccp_alpha).tree.leaves == leaves
+
+
+# --- history ------------------------------------------------------------------------------------
+
+
+def shuttling(demonstrations: int = 3, legs: int = 4, steps: int = 5) -> DemonstrationTable:
+    """Samples of driving to and fro between two walls: what to do depends on what was done."""
+    places, labels, number = [], [], []
+    for one in range(demonstrations):
+        place, label = 0.1 * one, "right"
+        for _ in range(legs * steps):
+            if place > steps:
+                label = "left"
+            elif place < 0:
+                label = "right"
+            places.append(place)
+            labels.append(label)
+            number.append(one)
+            place += 1 if label == "right" else -1
+    return table(places, labels, number)
+
+
+def by_hand(rows: DemonstrationTable, vocabulary: Vocabulary) -> float:
+    """Mean recall of unpruned fold trees, each made a behavior tree that lives through its fold."""
+    number = folds(rows)
+    hits, shown = np.zeros((2, len(rows.actions)))
+    for fold in np.unique(number):
+        trained = train(rows.where(number != fold), vocabulary=vocabulary)
+        own = rows.where(number == fold)
+        chosen = evaluation.own_history_choices(re_bt_espresso(trained.tree, delta=None), own)
+        for action, right in zip(own.chosen, chosen == own.chosen, strict=True):
+            hits[action] += right
+            shown[action] += 1
+    return float(np.mean(hits[shown > 0] / shown[shown > 0]))
+
+
+@settings(max_examples=25, deadline=None)
+@given(some.tables(min_rows=20, max_rows=50))
+def test_history_is_tested_where_own_history_recall_of_unpruned_fold_trees_is_higher_with_it(
+    rows: DemonstrationTable,
+) -> None:
+    with_it, without = by_hand(rows, some.PREVIOUS), by_hand(rows, FEATURES_ALONE)
+    for vocabulary, wanted in ((some.PREVIOUS, with_it), (FEATURES_ALONE, without)):
+        judge = CrossValidation(rows, vocabulary=vocabulary)
+        assert judge.unpruned_recall() == pytest.approx(wanted)
+    assume(abs(with_it - without) > 1e-9 or with_it == without)
+    history = choose(rows, LearnOptions(differences=Use.NEVER)).fitted.vocabulary.history
+    assert history is (History.PREVIOUS if with_it > without else History.NONE)
+
+
+def test_a_task_that_needs_memory_gets_the_previous_action() -> None:
+    policy = choose(shuttling(), LearnOptions())
+    assert policy.fitted.vocabulary.history is History.PREVIOUS
+    assert "Testing the previous action raises mean recall" in policy.reasons[0]
+    assert choose(shuttling(), LearnOptions(history=History.NONE)).fitted.vocabulary.history is (
+        History.NONE
+    )
+
+
+def test_a_task_that_needs_none_does_not_get_it() -> None:
+    policy = choose(noisy(), LearnOptions())
+    assert policy.fitted.vocabulary.history is History.NONE
+    assert "Testing the previous action does not raise mean recall" in policy.reasons[0]
+
+
+# --- differences --------------------------------------------------------------------------------
+
+
+def diagonal(rows: int = 400) -> DemonstrationTable:
+    """Turns where the left side is nearer than the right one, in demonstrations of 80 rows."""
+    random = np.random.default_rng(3)
+    sides = random.uniform(0, 2, size=(rows, 2))
+    labels = np.where(sides[:, 0] < sides[:, 1], "turn", "go").tolist()
+    plain = table(sides[:, 0].tolist(), labels, [row // 80 for row in range(rows)])
+    return replace(plain, features=(Feature("left"), Feature("right")), states=sides)
+
+
+@pytest.mark.parametrize("use", [Use.AUTO, Use.ALWAYS])
+def test_a_difference_that_makes_a_much_smaller_tree_is_tested(use: Use) -> None:
+    policy = choose(diagonal(), LearnOptions(differences=use))
+    assert policy.fitted.vocabulary.differences == (Difference("left", "right"),)
+    tree = policy.fitted.at(policy.ccp_alpha).tree
+    assert tree.leaves <= 4
+    said = any("make a smaller tree" in reason for reason in policy.reasons)
+    assert said is (use is Use.AUTO)
+
+
+def test_differences_are_not_tested_where_that_is_not_wanted() -> None:
+    policy = choose(diagonal(), LearnOptions(differences=Use.NEVER))
+    assert policy.fitted.vocabulary.differences == ()
+
+
+def test_a_difference_that_makes_no_smaller_tree_is_not_tested() -> None:
+    # A step across the diagonal: the difference tells much, but not all.
+    random = np.random.default_rng(5)
+    sides = random.uniform(0, 2, size=(400, 2))
+    labels = np.where((sides[:, 0] < 1) & (sides[:, 1] > 1), "turn", "go").tolist()
+    plain = table(sides[:, 0].tolist(), labels, [row // 80 for row in range(400)])
+    rows = replace(plain, features=(Feature("left"), Feature("right")), states=sides)
+    policy = choose(rows, LearnOptions())
+    assert policy.fitted.vocabulary.differences == ()
+    assert any("Differences of features make no better tree" in one for one in policy.reasons)
+
+
+# --- PSA nodes ----------------------------------------------------------------------------------
+
+
 def test_psa_nodes_stand_in_the_tree_where_asked_for_and_not_where_they_do_not_help() -> None:
     random = np.random.default_rng(1)
     numbers = random.normal(size=400)
     either = np.where(random.random(400) < 0.5, "left", "right")
     labels = np.where(numbers > 0, either, "go").tolist()
     ambiguous = table(numbers.tolist(), labels)
-    options = LearnOptions(max_depth=1, last_action=Use.NEVER)
+    options = LearnOptions(max_depth=1, history=History.NONE)
     auto = choose(ambiguous, options)
     assert not auto.psa
     assert "PSA nodes do not raise agreement" in auto.reasons[-1]
@@ -133,7 +376,7 @@ def test_psa_nodes_stand_in_the_tree_where_asked_for_and_not_where_they_do_not_h
         root=st.sampled_from((Root.SELECTOR, Root.PARALLEL)),
     ),
     paper=st.booleans(),
-    last_action=st.booleans(),
+    vocabulary=some.vocabularies,
     psa=st.booleans(),
 )
 def test_what_a_tree_is_judged_by_is_what_its_behavior_tree_chooses(
@@ -141,11 +384,11 @@ def test_what_a_tree_is_judged_by_is_what_its_behavior_tree_chooses(
     other: DemonstrationTable,
     options: LearnOptions,
     paper: bool,
-    last_action: bool,
+    vocabulary: Vocabulary,
     psa: bool,
 ) -> None:
     options = replace(options, reductions=None) if paper else options
-    trained = fit(table, last_action=last_action, max_depth=options.max_depth).at(0.01)
+    trained = fit(table, vocabulary=vocabulary, max_depth=options.max_depth).at(0.01)
     tree = convert(trained, options, psa=psa)
     for rows in (table, other):
         chosen = own_history_choices(trained, rows, options, psa=psa)

@@ -86,7 +86,7 @@ def test_learn_prints_the_tree_as_a_person_would_say_it(table: Path, tmp_path: P
 def test_learn_follows_its_options(table: Path, tmp_path: Path) -> None:
     done = run(
         "learn", table, "--out", tmp_path, "--root", "parallel", "--max-depth", "1", "--refit",
-        "--last-action", "never", "--ccp-alpha", "0", "--delta", "0.1", "--test-fraction", "0.5",
+        "--history", "none", "--ccp-alpha", "0", "--delta", "0.1", "--test-fraction", "0.5",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     summary = json.loads((tmp_path / "summary.json").read_text())

@@ -9,15 +9,19 @@ import strategies as some
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rebt_ros.behavior_tree import nodes
 from rebt_ros.logic.conditions import (
     KNOWN,
+    Difference,
     HasCategory,
     Interval,
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
     Threshold,
     deciding,
+    features_of,
 )
 from rebt_ros.logic.dnf import FALSE, TRUE, Conjunction, Dnf, conditions_of
 
@@ -34,12 +38,49 @@ def test_the_negation_of_the_negation_is_the_literal(literal: Literal) -> None:
     assert (~literal).condition == literal.condition
 
 
-@given(some.literals(), some.states, st.none() | st.sampled_from(some.LABELS))
+labels = st.none() | st.sampled_from(some.LABELS)
+
+
+@given(some.literals(), some.states, labels, labels)
 def test_of_a_literal_and_its_negation_exactly_one_holds(
-    literal: Literal, state: tuple[float, ...], last: str | None
+    literal: Literal, state: tuple[float, ...], last: str | None, previous: str | None
 ) -> None:
     # A missing value makes every condition false, and so its negation true.
-    assert some.holds(literal, state, last) is not some.holds(~literal, state, last)
+    before = (last, previous)
+    assert some.holds(literal, state, *before) is not some.holds(~literal, state, *before)
+
+
+def test_a_difference_is_of_two_features() -> None:
+    with pytest.raises(ValueError, match="the difference of 'distance' and itself is always 0"):
+        Difference("distance", "distance")
+    assert Difference("distance", "battery") != Difference("battery", "distance")
+
+
+@pytest.mark.parametrize(
+    ("condition", "features"),
+    [
+        (Threshold("distance", 0.3), ("distance",)),
+        (Interval("distance", 0.1, 0.3), ("distance",)),
+        (Threshold(some.DIFFERENCE, 0.3), ("distance", "battery")),
+        (Interval(some.DIFFERENCE, 0.1, 0.3), ("distance", "battery")),
+        (IsTrue("docked"), ("docked",)),
+        (HasCategory("kind", "cup"), ("kind",)),
+    ],
+)
+def test_a_condition_reads_these_features(
+    condition: Threshold | Interval | IsTrue | HasCategory, features: tuple[str, ...]
+) -> None:
+    assert features_of(condition) == features
+    tree = nodes.Sequence(
+        (*map(nodes.Condition, (Literal(condition), Literal(PreviousActionIs("go")))),)
+    )
+    assert nodes.features(tree) == set(features)
+
+
+def test_an_action_before_is_not_lat() -> None:
+    assert PreviousActionIs("go") != LastActionIs("go")
+    before = Literal(PreviousActionIs("go"))
+    assert deciding(before, ("turn",)) == before
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])

@@ -15,12 +15,14 @@ from ros_processes import AGES, NodeProcess, Peer, values_of
 from std_msgs.msg import String
 
 from rebt_ros.storage.inputs import load
+from rebt_ros.storage.recording import recordings
+from rebt_ros.storage.recording_head import Origin, read_head
 
 FIELDS = ("place", "door")
 GOAL = 2.0
 DOOR = 1.0
 
-PARAMETERS = {"last_action": "never", "psa": "never", "ccp_alpha": 0.0}
+PARAMETERS = {"history": "none", "psa": "never", "ccp_alpha": 0.0}
 
 
 class Corridor:
@@ -89,6 +91,27 @@ class Course:
         self.robot.obey(message.data)
 
 
+def recorded(peer: Peer, rows: int, **values: str) -> None:
+    """Waits until the recorder reports that so many rows are in files, and the values."""
+    wanted = {"rows": str(rows)} | {key.replace("_", " "): one for key, one in values.items()}
+    peer.wait_until(
+        lambda: (
+            (one := peer.diagnostics.get("recorder: recording"))
+            and wanted.items() <= values_of(one).items()
+        ),
+        what=str(wanted),
+    )
+
+
+def origins(directory: Path) -> list[Origin]:
+    """Of the recordings, oldest first."""
+    found = []
+    for path in recordings(directory):
+        with path.open("rb") as file:
+            found.append(read_head(path, file).origin)
+    return found
+
+
 @pytest.mark.parametrize("novelty", ["ignore", "hold"])
 def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
     domain: int, peer: Peer, tmp_path: Path, novelty: str
@@ -110,17 +133,8 @@ def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
         # The recorder and the executor.
         peer.connect(String, "action", subscribers=2)
 
-        def recorded(rows: int) -> None:
-            peer.wait_until(
-                lambda: (
-                    (one := peer.diagnostics.get("recorder: recording"))
-                    and values_of(one)["rows"] == str(rows)
-                ),
-                what=f"{rows} rows",
-            )
-
         shown = course.demonstrate(lambda: course.robot.gripped)
-        recorded(shown)
+        recorded(peer, shown)
         answer = peer.call("/learner/relearn")
         assert f"{shown} rows of 1 demonstration" in answer.message
         assert peer.call("/executor/enable", True).success
@@ -142,11 +156,12 @@ def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
 
         # A person opens it, and the robot goes on by itself.
         corrected = course.demonstrate(lambda: course.robot.left_to_open == 0)
-        recorded(shown + corrected)
+        recorded(peer, shown + corrected, takeovers="1", failed_episodes="0")
         course.until(lambda: course.robot.gripped, "the goal")
         assert peer.call("/recorder/record", False).success
 
         # What the person did is a demonstration of its own, with what the robot had done before.
+        assert origins(tmp_path / "demonstrations") == [Origin.DEMONSTRATION, Origin.TAKEOVER]
         first, second = load([tmp_path / "demonstrations"]).demonstrations
         assert (len(first), len(second)) == (shown, corrected)
         assert first.before == {}
@@ -160,3 +175,64 @@ def test_a_robot_that_fails_before_a_door_opens_it_once_it_was_corrected(
         course.until(lambda: course.robot.gripped, "the goal")
         assert "open" in course.commands
         assert "wait" not in course.commands
+
+
+def test_a_robot_that_failed_before_a_door_opens_it_once_it_was_shown(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    executing = {"rate": 50.0, "takeover_timeout": 4.0, "state_timeout": AGES}
+    with (
+        NodeProcess("recorder_node", domain, tmp_path, {"state_wait": 0.2}),
+        NodeProcess("learner_node", domain, tmp_path, PARAMETERS),
+        NodeProcess("executor_node", domain, tmp_path, executing),
+    ):
+        course = Course(peer)
+        peer.connect(String, "action", subscribers=2)
+        shown = course.demonstrate(lambda: course.robot.gripped)
+        recorded(peer, shown)
+        assert peer.call("/recorder/record", False).success
+        assert peer.call("/learner/relearn").success
+        assert peer.call("/executor/enable", True).success
+        course.begin(closed=True)
+        course.until(lambda: course.robot.state == (DOOR, 1.0), "the door")
+        course.commands.clear()
+        course.until(lambda: len(course.commands) > 50, "fifty commands")
+        assert course.robot.left_to_open == 8
+
+        # It drives on while a person says that it failed.
+        answer = peer.call("/recorder/failed")
+        assert answer.success
+        assert answer.message.startswith("recording. Now disable the executor, put the robot back")
+        course.commands.clear()
+        course.until(lambda: len(course.commands) > 20, "twenty commands")
+        recorded(peer, shown, failed_episodes="1", origin_of_the_demonstration="failed")
+        waiting = peer.diagnostics["recorder: recording"].message
+        assert waiting == "waiting for a person to show what failed"
+        assert peer.call("/executor/enable", False).success
+
+        # Put back, and shown from its start to its end.
+        course.begin(closed=True)
+        corrected = course.demonstrate(lambda: course.robot.gripped)
+        answer = peer.call("/recorder/new_demonstration")
+        assert f"recorded {corrected} rows in " in answer.message
+        recorded(
+            peer,
+            shown + corrected,
+            failed_episodes="1",
+            takeovers="0",
+            origin_of_the_demonstration="demonstration",
+        )
+        assert origins(tmp_path / "demonstrations") == [Origin.DEMONSTRATION, Origin.FAILED]
+        first, second = load([tmp_path / "demonstrations"]).demonstrations
+        assert (len(first), len(second)) == (shown, corrected)
+        assert second.before == {}
+        assert second.states[0].tolist() == [0.0, 0.0]
+        assert [second.actions[int(one)] for one in second.chosen].count("open") == 8
+
+        answer = peer.call("/learner/relearn")
+        assert f"{shown + corrected} rows of 2 demonstrations" in answer.message
+        status(peer, "disabled", robot=course, rows=str(shown + corrected))
+        course.begin(closed=True)
+        assert peer.call("/executor/enable", True).success
+        course.until(lambda: course.robot.gripped, "the goal")
+        assert "open" in course.commands

@@ -23,8 +23,19 @@ from rebt_ros.behavior_tree.document import (
     json_schema,
     loads,
 )
-from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, SuggestionKind
+from rebt_ros.behavior_tree.learned_tree import (
+    ChannelProvenance,
+    Figures,
+    LearnedTree,
+    Provenance,
+    Root,
+    Suggestion,
+    SuggestionKind,
+)
 from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
+from rebt_ros.demonstration.demonstration import RowKind
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import DocumentError
 from rebt_ros.logic.conditions import (
     HasCategory,
@@ -32,6 +43,8 @@ from rebt_ros.logic.conditions import (
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
+    Quantity,
     Threshold,
 )
 
@@ -51,13 +64,28 @@ EVERY_NODE = nodes.Parallel(
             )
         ),
         nodes.Condition(Literal(Interval("battery", 0.1, 0.7))),
+        nodes.Condition(Literal(Threshold(some.DIFFERENCE, 0.1 + 0.2))),
+        nodes.Condition(~Literal(Interval(some.DIFFERENCE, -0.1, 0.0))),
+        nodes.Condition(Literal(PreviousActionIs("go"))),
     )
 )
 FULL = LearnedTree(
     some.FEATURES,
     some.ACTIONS,
     EVERY_NODE,
-    some.PROVENANCE,
+    Provenance(
+        3,
+        70,
+        0.3,
+        5,
+        0.01,
+        Root.SELECTOR,
+        History.PREVIOUS,
+        Figures(0, 0.75, 0.5, 20, 0.25),
+        (ChannelProvenance(some.CHANNEL, 70, 0.01, History.LAST, Figures(1, None, None, 0)),),
+        late_rows=2,
+        late_seconds=0.2,
+    ),
     (Suggestion("psa-1", SuggestionKind.PSA, 3, EVERY_NODE.children[3], attached=True),),
     (
         ShownChannel(
@@ -65,6 +93,7 @@ FULL = LearnedTree(
             (ShownLeaf(7, (Span(0.1, 0.1 + 0.2), None, Span(0.0, 1.0), ("cup",))),),
         ),
     ),
+    RowKind.SAMPLE,
 )
 
 
@@ -115,20 +144,24 @@ def test_what_is_dumped_is_loaded_again(learned: LearnedTree) -> None:
 @example(1.7976931348623157e308)
 @example(0.1 + 0.2)
 def test_thresholds_keep_every_bit(value: float) -> None:
-    tree = nodes.Condition(Literal(Threshold("distance", value)))
-    loaded = loads(dumps(some.learned(tree))).tree
-    assert isinstance(loaded, nodes.Condition)
-    assert isinstance(loaded.literal.condition, Threshold)
-    assert struct.pack("d", loaded.literal.condition.value) == struct.pack("d", value)
+    for quantity in ("distance", some.DIFFERENCE):
+        tree = nodes.Condition(Literal(Threshold(quantity, value)))
+        loaded = loads(dumps(some.learned(tree))).tree
+        assert isinstance(loaded, nodes.Condition)
+        threshold = loaded.literal.condition
+        assert isinstance(threshold, Threshold)
+        assert threshold.quantity == quantity
+        assert struct.pack("d", threshold.value) == struct.pack("d", value)
 
 
-@given(some.ends)
-def test_ends_of_intervals_keep_every_bit(between: list[float]) -> None:
-    tree = nodes.Condition(Literal(Interval("distance", *between)))
+@given(some.quantities, some.ends)
+def test_ends_of_intervals_keep_every_bit(quantity: Quantity, between: list[float]) -> None:
+    tree = nodes.Condition(Literal(Interval(quantity, *between)))
     loaded = loads(dumps(some.learned(tree))).tree
     assert isinstance(loaded, nodes.Condition)
     interval = loaded.literal.condition
     assert isinstance(interval, Interval)
+    assert interval.quantity == quantity
     assert struct.pack("2d", interval.above, interval.at_most) == struct.pack("2d", *between)
 
 
@@ -138,7 +171,7 @@ def test_the_schema_is_one() -> None:
 
 def test_numbers_may_be_written_with_or_without_a_fraction() -> None:
     changed = document()
-    changed["version"] = 2.0
+    changed["version"] = 3.0
     changed["provenance"]["rows"] = 7.0
     changed["provenance"]["delta"] = 1
     changed["tree"]["children"][0]["children"][0]["test"]["at_most"] = 3
@@ -149,12 +182,120 @@ def test_numbers_may_be_written_with_or_without_a_fraction() -> None:
     assert type(loaded.provenance.delta) is float
 
 
+#: As earlier releases wrote them.
+VERSION_2 = """{
+ "format": "rebt_ros/behavior_tree",
+ "version": 2,
+ "features": [
+  {"name": "distance", "kind": "numeric", "topic": "state", "index": 0},
+  {"name": "docked", "kind": "binary", "topic": "state", "index": 1, "lag": 2}
+ ],
+ "actions": [{"label": "go", "channel": "action"}, {"label": "turn", "channel": "action"}],
+ "tree": {
+  "type": "selector",
+  "children": [
+   {
+    "type": "sequence",
+    "children": [
+     {
+      "type": "condition",
+      "test": {"type": "threshold", "feature": "distance", "at_most": 0.30000000000000004},
+      "positive": true
+     },
+     {
+      "type": "condition",
+      "test": {"type": "last_action_is", "action": "go", "deciding": ["turn"]},
+      "positive": false
+     },
+     {"type": "action", "label": "turn", "channel": "action"}
+    ]
+   },
+   {"type": "action", "label": "go", "channel": "action"}
+  ]
+ },
+ "suggestions": [],
+ "provenance": {
+  "demonstrations": 2,
+  "rows": 40,
+  "delta": 0.3,
+  "max_depth": null,
+  "ccp_alpha": 0.01,
+  "root": "selector",
+  "uses_last_action": true,
+  "figures": {
+   "fidelity_mismatches": 0,
+   "teacher_forced_agreement": 0.9,
+   "own_history_agreement": 0.8,
+   "held_out_rows": 10
+  },
+  "channels": [
+   {
+    "channel": "action",
+    "rows": 40,
+    "ccp_alpha": 0.01,
+    "uses_last_action": false,
+    "figures": {
+     "fidelity_mismatches": 0,
+     "teacher_forced_agreement": null,
+     "own_history_agreement": null,
+     "held_out_rows": 0
+    }
+   }
+  ]
+ },
+ "shown": [{"channel": "action", "leaves": [{"rows": 40, "values": [[0.1, 2.0], null]}]}]
+}"""
+
+
+def of_version_2() -> LearnedTree:
+    go, turn = some.action("go"), some.action("turn")
+    last = ~Literal(LastActionIs("go", ("turn",)))
+    return LearnedTree(
+        (
+            Feature("distance", topic="state", index=0),
+            Feature("docked", FeatureKind.BINARY, topic="state", index=1, lag=2),
+        ),
+        (go, turn),
+        nodes.Selector((some.when(NEAR, last, then=turn), go)),
+        Provenance(
+            2,
+            40,
+            0.3,
+            None,
+            0.01,
+            Root.SELECTOR,
+            History.LAST,
+            Figures(0, 0.9, 0.8, 10, None),
+            (ChannelProvenance("action", 40, 0.01, History.NONE, Figures(0, None, None, 0)),),
+        ),
+        shown=(ShownChannel("action", (ShownLeaf(40, (Span(0.1, 2.0), None)),)),),
+        row_kind=RowKind.EVENT,
+    )
+
+
+def test_a_document_of_version_2_is_read_as_one_of_events_with_lat_or_without() -> None:
+    assert SCHEMA.is_valid(json.loads(VERSION_2))
+    read = loads(VERSION_2)
+    assert read == of_version_2()
+    # What is written now is of this version, and the same tree.
+    again = dumps(read)
+    assert json.loads(again)["version"] == 3
+    assert loads(again) == read
+
+
 def test_a_document_of_version_1_is_read_and_says_nothing_of_what_was_shown() -> None:
-    old = document()
+    old = json.loads(VERSION_2)
     old["version"] = 1
     del old["shown"]
     assert SCHEMA.is_valid(old)
-    assert loads(json.dumps(old)) == replace(FULL, shown=())
+    assert loads(json.dumps(old)) == replace(of_version_2(), shown=())
+
+
+def test_documents_of_earlier_versions_have_nothing_of_later_ones() -> None:
+    old = json.loads(VERSION_2)
+    old["row_kind"] = "sample"
+    assert not SCHEMA.is_valid(old)
+    assert "unknown field 'row_kind'" in refusal(json.dumps(old))
 
 
 # --- the schema and the reader agree ----------------------------------------------------------
@@ -171,6 +312,7 @@ EXTRA_RULES = (
     "a leaf has the values of",
     "cannot be",
     "does not have all categories",
+    "and itself is always 0",
 )
 
 
@@ -233,12 +375,16 @@ def test_the_reader_accepts_what_the_schema_accepts(changed: Any) -> None:
         assert reason is not None
 
 
+#: Without "minus" a quantity is a feature.
+HAVE_DEFAULTS = {"memory", "channels", "mean_recall", "late_rows", "late_seconds", "minus"}
+
+
 def test_no_field_can_be_left_out_unless_it_has_a_default() -> None:
     count = len(list(places(document())))
     for number in range(count):
         changed = document()
         container, key = list(places(changed))[number]
-        if isinstance(container, dict) and key != "memory":
+        if isinstance(container, dict) and key not in HAVE_DEFAULTS:
             del container[key]
             assert not SCHEMA.is_valid(changed)
             refusal(json.dumps(changed))
@@ -265,8 +411,59 @@ Change = Callable[[dict[str, Any]], object]
         (lambda d: d.update(extra=1), "document has the unknown field 'extra'."),
         (lambda d: d.pop("format"), "does not say that its format is 'rebt_ros/behavior_tree'"),
         (lambda d: d.update(format="bt"), "does not say that its format is"),
-        (lambda d: d.update(version=3), "version 3: this release of rebt_ros reads the versions 1"),
-        (lambda d: d.update(version=1), "unknown field 'shown'"),
+        (lambda d: d.update(version=4), "version 4: this release of rebt_ros reads the versions 1"),
+        (lambda d: d.update(version=1), "unknown field"),
+        (lambda d: d.update(version=2), "unknown field 'row_kind'"),
+        (lambda d: d.pop("row_kind"), "document lacks 'row_kind'."),
+        (
+            lambda d: d.update(row_kind="state"),
+            "document.row_kind must be one of event, sample, not 'state'.",
+        ),
+        (
+            lambda d: d["provenance"].update(uses_last_action=True),
+            "document.provenance must have either 'history' or 'uses_last_action'.",
+        ),
+        (
+            lambda d: d["provenance"]["channels"][0].pop("history"),
+            "document.provenance.channels[0] must have either",
+        ),
+        (
+            lambda d: d["provenance"].update(history="lat"),
+            "document.provenance.history must be one of none, previous, last, not 'lat'.",
+        ),
+        (
+            lambda d: d["provenance"].update(late_rows=-1),
+            "document.provenance.late_rows must be a whole number of at least 0, not -1.",
+        ),
+        (lambda d: d["provenance"].update(late_seconds=-0.1), "document.provenance.late_seconds"),
+        (
+            lambda d: d["provenance"]["figures"].update(mean_recall=1.5),
+            "document.provenance.figures.mean_recall must be a number from 0 to 1, not 1.5.",
+        ),
+        (
+            lambda d: d["tree"]["children"][6]["test"].update(minus="distance"),
+            "the difference of 'distance' and itself is always 0",
+        ),
+        (
+            lambda d: d["tree"]["children"][6]["test"].update(minus="speed"),
+            "feature 'speed' is not declared",
+        ),
+        (
+            lambda d: d["tree"]["children"][7]["test"].update(feature="speed"),
+            "feature 'speed' is not declared",
+        ),
+        (
+            lambda d: d["tree"]["children"][7]["test"].update(minus=None),
+            "document.tree.children[7].test.minus must be a text, not None.",
+        ),
+        (
+            lambda d: d["tree"]["children"][1]["children"][0]["child"]["test"].update(minus="x"),
+            "has the unknown field 'minus'",
+        ),
+        (
+            lambda d: d["tree"]["children"][8]["test"].update(action="fly"),
+            "previous action 'fly' is not declared",
+        ),
         (lambda d: d.pop("shown"), "document lacks 'shown'."),
         (
             lambda d: d["shown"][0]["leaves"][0]["values"].pop(),

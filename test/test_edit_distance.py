@@ -19,6 +19,7 @@ from strategies import (
     condition_nodes,
     last_actions,
     literals,
+    previous_actions,
     trees,
 )
 
@@ -37,7 +38,14 @@ from rebt_ros.edit_distance.networkx_measure import (
     NetworkxMeasure,
     networkx_distance,
 )
-from rebt_ros.logic.conditions import HasCategory, Interval, IsTrue, LastActionIs, Literal
+from rebt_ros.logic.conditions import (
+    HasCategory,
+    Interval,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    PreviousActionIs,
+)
 
 GO, TURN = action("go"), action("turn")
 FAR = nodes.Condition(at_most("distance", 0.5))
@@ -174,12 +182,12 @@ def test_conditions_on_the_last_action_are_left_out_with_groups_of_nothing_else(
 
 
 @given(trees())
-def test_what_is_compared_is_what_is_neither_inverter_nor_about_the_last_action(
+def test_what_is_compared_is_what_is_neither_inverter_nor_about_what_was_done_before(
     tree: nodes.Node,
 ) -> None:
     def left(node: nodes.Node) -> int:
         if isinstance(node, nodes.Condition):
-            return not isinstance(node.literal.condition, LastActionIs)
+            return not isinstance(node.literal.condition, PreviousActionIs | LastActionIs)
         below = sum(map(left, nodes.children(node)))
         counts = isinstance(node, nodes.Action) or (below and not isinstance(node, nodes.Inverter))
         return below + bool(counts)
@@ -188,8 +196,8 @@ def test_what_is_compared_is_what_is_neither_inverter_nor_about_the_last_action(
     assert (0 if found is None else len(found)) == left(tree)
 
 
-@given(trees(), literals(last_actions()))
-def test_wrapping_in_inverters_and_adding_conditions_on_the_last_action_changes_nothing(
+@given(trees(), literals(last_actions() | previous_actions))
+def test_wrapping_in_inverters_and_adding_conditions_on_the_history_changes_nothing(
     tree: nodes.Node, literal: Literal
 ) -> None:
     def disguised(node: nodes.Node) -> nodes.Node:

@@ -2,7 +2,9 @@
 
 The states tested are all feasible combinations of the decision tree's conditions, not only the
 rows that were learned from: every numeric feature takes a value between each two neighbouring
-thresholds, on each threshold and just beyond it, or is missing; LAT takes every action, or none.
+thresholds, on each threshold and just beyond it, or is missing; LAT and the previous action take
+every action, or none; of a difference, the one feature lies where it is just at each threshold and
+just beyond it, wherever the other one lies.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import strategies as some
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -23,14 +26,15 @@ from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
-from rebt_ros.behavior_tree.prediction import States, choose, last_action_column, triggered
+from rebt_ros.behavior_tree.prediction import States, choose, history_columns, triggered
 from rebt_ros.behavior_tree.runtime import TreeRuntime
-from rebt_ros.decision_tree.training import TrainedTree, train
+from rebt_ros.decision_tree.encoding import Vocabulary
+from rebt_ros.decision_tree.training import TrainedTree, fit, train
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
-from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
+from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import Threshold
+from rebt_ros.logic.conditions import Quantity, Threshold
 
 FEATURES = (
     Feature("distance"),
@@ -85,53 +89,81 @@ def _in_between() -> DemonstrationTable:
 IN_BETWEEN = _in_between()
 
 
+#: Rows of states at most: with several thresholds on a difference, combinations are very many.
+MOST_ROWS = 40_000
+
+
 def feasible_states(tree: DecisionTree, table: DemonstrationTable) -> DemonstrationTable:
-    """A table with one row for every feasible combination of the tree's conditions."""
-    thresholds: dict[str, set[float]] = {feature.name: set() for feature in FEATURES}
-    waiting: list[DecisionNode] = [tree.root]
-    while waiting:
-        node = waiting.pop()
-        if isinstance(node, Split):
-            waiting += [node.if_true, node.if_false]
-            if isinstance(node.condition, Threshold) and abs(node.condition.value) < 1e30:
-                thresholds[node.condition.feature].add(node.condition.value)
+    """A table with a row for every feasible combination of the tree's conditions.
+
+    Of very many, an even selection.
+    """
+    thresholds = thresholds_of(tree)
+    distances, batteries = (
+        [-1e30, math.nan, *beside(thresholds.get(name, set()))] for name in ("distance", "battery")
+    )
+    # Where the difference is about at one of its thresholds, below all and above all.
+    pairs = set(itertools.product(distances, batteries))
+    for apart in beside(thresholds.get(some.DIFFERENCE, set())):
+        for battery in (0.0, *batteries):
+            if math.isfinite(battery):
+                pairs |= {(value, battery) for value in beside({battery + apart})}
     candidates = [
-        *(
-            [-1e30, math.nan]
-            + [
-                float(value)
-                for threshold in sorted(thresholds[name])
-                for value in (threshold, np.nextafter(threshold, np.inf))
-            ]
-            for name in ("distance", "battery")
-        ),
         [0.0, 1.0],
         [0.0, 1.0, 2.0, math.nan],
         [float(code) for code in range(NO_ACTION, len(LABELS))],
     ]
-    combinations = np.array(list(itertools.product(*candidates)))
+    # A tree tests one of the histories, so that one value can stand for both.
+    others = np.array(list(itertools.product(*candidates)))
+    numeric = np.array(sorted(pairs, key=str))
+    combinations = np.hstack(
+        [np.repeat(numeric, len(others), axis=0), np.tile(others, (len(numeric), 1))]
+    )
+    combinations = combinations[:: -(-len(combinations) // MOST_ROWS)]
     feasible = replace(
         table,
         states=combinations[:, :4],
         chosen=np.zeros(len(combinations), dtype=np.int64),
         demonstration=np.zeros(len(combinations), dtype=np.int64),
         stamps=np.arange(len(combinations)),
+        previous=np.full(len(combinations), NO_ACTION),
     )
-    return with_last(feasible, combinations[:, 4].astype(np.int64))
+    return with_history(feasible, combinations[:, 4].astype(np.int64))
+
+
+def thresholds_of(tree: DecisionTree) -> dict[Quantity, set[float]]:
+    found: dict[Quantity, set[float]] = {}
+    waiting: list[DecisionNode] = [tree.root]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Split):
+            waiting += [node.if_true, node.if_false]
+            if isinstance(node.condition, Threshold) and abs(node.condition.value) < 1e30:
+                found.setdefault(node.condition.quantity, set()).add(node.condition.value)
+    return found
+
+
+def beside(values: set[float]) -> list[float]:
+    """On each value and just beyond it."""
+    return [float(one) for value in sorted(values) for one in (value, np.nextafter(value, np.inf))]
 
 
 def as_learned(tree: nodes.Node, trained: TrainedTree) -> LearnedTree:
     figures = Figures(0, None, None, 0)
-    provenance = Provenance(1, 1, 0.0, None, 0.0, Root.SELECTOR, trained.uses_last_action, figures)
+    history = trained.vocabulary.history
+    provenance = Provenance(1, 1, 0.0, None, 0.0, Root.SELECTOR, history, figures)
     return LearnedTree(FEATURES, trained.tree.actions, tree, provenance)
+
+
+def states_of(table: DemonstrationTable) -> States:
+    columns = history_columns(table.actions, table.previous, table.last)
+    return States(FEATURES, table.states, columns)
 
 
 def predicted_by_tree(
     tree: nodes.Node, trained: TrainedTree, table: DemonstrationTable
 ) -> list[int]:
-    column = last_action_column(table.actions, table.last)
-    states = States(FEATURES, table.states, column)
-    return choose(tree, trained.tree.actions, states).tolist()
+    return choose(tree, trained.tree.actions, states_of(table)).tolist()
 
 
 class OneLastAction(ActionHistory):
@@ -149,30 +181,38 @@ def ticked_by_runtime(learned: LearnedTree, table: DemonstrationTable) -> list[l
     runtime = TreeRuntime(learned, histories={"action": history})
     ticked = []
     for state, last in zip(table.states.tolist(), table.last.tolist(), strict=True):
-        history.last = None if last == NO_ACTION else LABELS[last]
+        history.last = history.previous = None if last == NO_ACTION else LABELS[last]
         ticked.append([action.label for action in runtime.tick(state).actions])
     return ticked
 
 
-def with_last(table: DemonstrationTable, last: IntArray) -> DemonstrationTable:
-    """The table with the given LAT column instead of the one that follows from its actions."""
-    object.__setattr__(table, "last", last)
+def with_history(table: DemonstrationTable, codes: IntArray) -> DemonstrationTable:
+    """The table with the given LAT, and previous action, instead of what its actions say."""
+    object.__setattr__(table, "last", codes)
+    object.__setattr__(table, "previous", codes)
     return table
 
 
 def every(table: DemonstrationTable, step: int) -> DemonstrationTable:
     part = table.where(np.arange(len(table)) % step == 0)
-    return with_last(part, table.last[::step])
+    return with_history(part, table.last[::step])
+
+
+VOCABULARIES = [
+    pytest.param(Vocabulary(history, differences), id=f"{history.value}, {len(differences)}")
+    for history in History
+    for differences in ((), (some.DIFFERENCE,))
+]
 
 
 @pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])
-@pytest.mark.parametrize("last_action", [False, True], ids=["without LAT", "with LAT"])
-@settings(max_examples=40, deadline=None)
+@pytest.mark.parametrize("vocabulary", VOCABULARIES)
+@settings(max_examples=25, deadline=None)
 @given(table=tables())
 def test_the_behavior_tree_chooses_what_the_decision_tree_predicts_at_every_feasible_state(
-    root: Root, last_action: bool, table: DemonstrationTable
+    root: Root, vocabulary: Vocabulary, table: DemonstrationTable
 ) -> None:
-    trained = train(table, last_action=last_action, max_depth=4)
+    trained = train(table, vocabulary=vocabulary, max_depth=4)
     learned = as_learned(re_bt_espresso(trained.tree, delta=0.0, root=root), trained)
     feasible = feasible_states(trained.tree, table)
     expected = trained.predict(feasible)
@@ -184,25 +224,51 @@ def test_the_behavior_tree_chooses_what_the_decision_tree_predicts_at_every_feas
     assert ticked_by_runtime(loads(dumps(learned)), every(feasible, step)) == wanted
 
 
+@settings(max_examples=60, deadline=None)
+@given(
+    table=tables(),
+    vocabulary=some.vocabularies,
+    root=st.sampled_from((Root.PARALLEL, Root.SELECTOR)),
+    ccp_alpha=st.sampled_from((0.0, 0.02)),
+)
+@example(table=IN_BETWEEN, vocabulary=some.EVERYTHING, root=Root.SELECTOR, ccp_alpha=0.0)
+def test_a_tree_with_readable_thresholds_is_chosen_by_exactly(
+    table: DemonstrationTable, vocabulary: Vocabulary, root: Root, ccp_alpha: float
+) -> None:
+    trained = fit(table, vocabulary=vocabulary, max_depth=4).readable_at(ccp_alpha, table)
+    feasible = feasible_states(trained.tree, table)
+    expected = trained.predict(feasible)
+    rules = leaf_rules(trained.tree, lambda leaf: (leaf.most_probable,))
+    for tree in (
+        re_bt_espresso(trained.tree, delta=None, root=root),
+        reduced_tree(rules, root=root),
+    ):
+        assert predicted_by_tree(tree, trained, feasible) == expected.tolist()
+    step = 1 + len(feasible) // 100
+    wanted = [[LABELS[code]] for code in expected[::step]]
+    learned = as_learned(reduced_tree(rules, root=root), trained)
+    assert ticked_by_runtime(loads(dumps(learned)), every(feasible, step)) == wanted
+
+
 @pytest.mark.parametrize("root", [Root.PARALLEL, Root.SELECTOR])
 @pytest.mark.parametrize(
     "reductions", [Reductions(*flags) for flags in itertools.product((True, False), repeat=4)]
 )
 @settings(max_examples=6, deadline=None)
-@given(table=tables())
-@example(table=IN_BETWEEN)
+@given(table=tables(), vocabulary=some.vocabularies)
+@example(table=IN_BETWEEN, vocabulary=some.LAT)
+@example(table=IN_BETWEEN, vocabulary=some.EVERYTHING)
 def test_a_reduced_tree_chooses_what_the_decision_tree_predicts_at_every_feasible_state(
-    reductions: Reductions, root: Root, table: DemonstrationTable
+    reductions: Reductions, root: Root, table: DemonstrationTable, vocabulary: Vocabulary
 ) -> None:
-    trained = train(table, last_action=True, max_depth=5)
+    trained = train(table, vocabulary=vocabulary, max_depth=5)
     rules = leaf_rules(trained.tree, lambda leaf: (leaf.most_probable,))
     learned = as_learned(reduced_tree(rules, reductions, root), trained)
     feasible = feasible_states(trained.tree, table)
     expected = trained.predict(feasible)
     assert predicted_by_tree(learned.tree, trained, feasible) == expected.tolist()
     if root is Root.PARALLEL:
-        column = last_action_column(LABELS, feasible.last)
-        ticked = triggered(learned.tree, States(FEATURES, feasible.states, column))
+        ticked = triggered(learned.tree, states_of(feasible))
         assert (np.sum(list(ticked.values()), axis=0) == 1).all()
     step = 1 + len(feasible) // 100
     wanted = [[LABELS[code]] for code in expected[::step]]
@@ -210,26 +276,26 @@ def test_a_reduced_tree_chooses_what_the_decision_tree_predicts_at_every_feasibl
 
 
 @settings(max_examples=40, deadline=None)
-@given(table=tables())
+@given(table=tables(), vocabulary=some.vocabularies)
 def test_the_baseline_chooses_what_the_decision_tree_predicts_at_every_feasible_state(
-    table: DemonstrationTable,
+    table: DemonstrationTable, vocabulary: Vocabulary
 ) -> None:
-    trained = train(table, last_action=True, max_depth=4)
+    trained = train(table, vocabulary=vocabulary, max_depth=4)
     feasible = feasible_states(trained.tree, table)
     tree = bt_espresso(trained.tree)
     assert predicted_by_tree(tree, trained, feasible) == trained.predict(feasible).tolist()
 
 
 @settings(max_examples=40, deadline=None)
-@given(table=tables(), delta=st.sampled_from((0.0, 0.3, 1.0)))
+@given(table=tables(), vocabulary=some.vocabularies, delta=st.sampled_from((0.0, 0.3, 1.0)))
 def test_the_actions_offered_are_the_delta_close_ones_of_the_decision_trees_leaf(
-    table: DemonstrationTable, delta: float
+    table: DemonstrationTable, vocabulary: Vocabulary, delta: float
 ) -> None:
-    trained = train(table, last_action=True, max_depth=2)
+    trained = train(table, vocabulary=vocabulary, max_depth=2)
     feasible = feasible_states(trained.tree, table)
     tree = re_bt_espresso(trained.tree, delta=delta, root=Root.PARALLEL)
     groups = offered(tree, trained.tree.actions, feasible)
-    literals_of = States(FEATURES, feasible.states, last_action_column(LABELS, feasible.last))
+    literals_of = states_of(feasible)
     for conjunction, leaf in trained.tree.paths():
         rows = np.ones(len(feasible), dtype=bool)
         for literal in conjunction:
@@ -243,8 +309,7 @@ def offered(
     tree: nodes.Node, actions: tuple[nodes.Action, ...], table: DemonstrationTable
 ) -> BoolArray:
     """Which actions stand in the PSA nodes, or alone, that are reached, shape (rows, actions)."""
-    states = States(FEATURES, table.states, last_action_column(LABELS, table.last))
-    ticked = triggered(reaching_all(tree), states)
+    ticked = triggered(reaching_all(tree), states_of(table))
     return np.column_stack(
         [ticked.get(action, np.zeros(len(table), dtype=bool)) for action in actions]
     )

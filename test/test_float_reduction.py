@@ -30,6 +30,7 @@ PLACES = (
     math.nan,
 )
 distance_literals = some.literals(some.thresholds("distance"))
+difference_literals = some.literals(some.thresholds(some.DIFFERENCE))
 
 
 def in_all_states(rule: Dnf, vocabulary: Dnf) -> list[bool]:
@@ -138,14 +139,19 @@ def test_two_literals_that_imply_each_other_are_the_same(one: Literal, two: Lite
 def test_an_implication_holds_in_every_state(one: Literal, two: Literal) -> None:
     if implies(one, two):
         for place in PLACES:
-            state = (place, place, 1.0, 1.0)
-            assert not some.holds(one, state, "go") or some.holds(two, state, "go")
+            for state in ((place, place, 1.0, 1.0), (place, 0.0, 1.0, 1.0)):
+                before = ("go", "go")
+                assert not some.holds(one, state, *before) or some.holds(two, state, *before)
 
 
-@given(distance_literals, distance_literals)
-def test_every_implication_between_thresholds_of_one_feature_is_found(
-    one: Literal, two: Literal
+@given(
+    st.one_of(st.tuples(*[literals] * 2) for literals in (distance_literals, difference_literals))
+)
+def test_every_implication_between_thresholds_of_one_quantity_is_found(
+    pair: tuple[Literal, Literal],
 ) -> None:
+    one, two = pair
+    # A difference to 0 is the value itself.
     everywhere = all(
         not some.holds(one, (place, 0, 0, 0)) or some.holds(two, (place, 0, 0, 0))
         for place in PLACES
@@ -153,8 +159,8 @@ def test_every_implication_between_thresholds_of_one_feature_is_found(
     assert implies(one, two) is everywhere
 
 
-@given(distance_literals, some.literals(some.thresholds("battery")))
-def test_thresholds_of_different_features_imply_nothing(one: Literal, two: Literal) -> None:
+@given(distance_literals, st.one_of(some.literals(some.thresholds("battery")), difference_literals))
+def test_thresholds_of_different_quantities_imply_nothing(one: Literal, two: Literal) -> None:
     assert not implies(one, two)
     assert not implies(two, one)
 

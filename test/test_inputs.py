@@ -14,6 +14,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import Row
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import DocumentError, InputError, OptionError
 from rebt_ros.storage import atomic
@@ -137,7 +138,7 @@ def test_what_is_not_there_is_refused(tmp_path):
 def learned() -> LearnedTree:
     go = nodes.Action("go", "/a")
     figures = Figures(0, None, None, 0)
-    origin = Provenance(1, 1, 0.0, None, 0.0, Root.SELECTOR, False, figures)
+    origin = Provenance(1, 1, 0.0, None, 0.0, Root.SELECTOR, History.NONE, figures)
     return LearnedTree((Feature("x"),), (go,), nodes.Selector((go,)), origin)
 
 

@@ -1,4 +1,4 @@
-"""Two thresholds on one feature as one interval: the same in every state, in fewer conditions."""
+"""Two thresholds on one quantity as one interval: the same in every state, in fewer conditions."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from rebt_ros.algorithms.priority_root import ALL_REDUCTIONS, reduced_tree
 from rebt_ros.algorithms.rules import leaf_rules
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
-from rebt_ros.behavior_tree.prediction import States, last_action_of
+from rebt_ros.behavior_tree.prediction import States, as_it_stands
 from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import train
 from rebt_ros.decision_tree.tree import DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import KNOWN, Interval, IsTrue, Literal, Threshold
+from rebt_ros.logic.conditions import KNOWN, Interval, IsTrue, Literal, Quantity, Threshold
 from rebt_ros.logic.factoring import Factored
 from rebt_ros.logic.intervals import merged, with_intervals
 
@@ -46,7 +47,9 @@ PLACES = (
     math.nan,
 )
 
-literals = some.literals(st.one_of(some.thresholds("distance"), some.conditions()))
+literals = some.literals(
+    st.one_of(some.thresholds("distance"), some.thresholds(some.DIFFERENCE), some.conditions())
+)
 #: Like a conjunction that float reduction has left alone, or has not.
 lists = st.lists(literals, max_size=6, unique_by=lambda one: one.condition).map(tuple)
 #: As they come: intervals are made only once.
@@ -70,14 +73,17 @@ def asked(condition: Factored) -> list[Literal]:
     return [*condition.common, *(one for each in condition.alternatives for one in asked(each))]
 
 
-@given(some.intervals("distance"), st.booleans())
+@pytest.mark.parametrize("quantity", ["distance", some.DIFFERENCE], ids=str)
+@given(data=st.data(), positive=st.booleans())
 def test_an_interval_is_what_the_pair_of_thresholds_is_wherever_the_value_lies(
-    interval: Interval, positive: bool
+    quantity: Quantity, data: st.DataObject, positive: bool
 ) -> None:
-    lower = ~some.at_most("distance", interval.above)
-    upper = some.at_most("distance", interval.at_most)
-    rows = [(place, math.nan, math.nan, math.nan) for place in PLACES]
-    states = States(some.FEATURES, np.array(rows), last_action_of(ActionHistory()))
+    interval = data.draw(some.intervals(quantity))
+    lower = ~some.at_most(quantity, interval.above)
+    upper = some.at_most(quantity, interval.at_most)
+    # A difference to 0 is the value itself.
+    rows = [(place, 0.0, math.nan, math.nan) for place in PLACES]
+    states = States(some.FEATURES, np.array(rows), as_it_stands(ActionHistory()))
     pair = states.satisfy(lower) & states.satisfy(upper)
     literal = Literal(interval, positive)
     assert states.satisfy(literal).tolist() == (pair if positive else ~pair).tolist()
@@ -109,7 +115,7 @@ def test_no_pair_is_left_and_nothing_else_changes(conjunction: tuple[Literal, ..
     assert len(conjunction) - len(reduced) == len(new)
     left = [one for one in rest if isinstance(one.condition, Threshold)]
     assert not any(
-        lower.condition.feature == upper.condition.feature
+        lower.condition.quantity == upper.condition.quantity
         and lower.condition.value < upper.condition.value
         for lower in left
         for upper in left
@@ -168,9 +174,11 @@ def test_a_reduced_tree_asks_for_an_interval_unless_told_otherwise() -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(some.tables(min_rows=4), st.sampled_from((Root.SELECTOR, Root.PARALLEL)))
-def test_intervals_make_a_tree_no_larger(table: DemonstrationTable, root: Root) -> None:
-    trained = train(table, last_action=True, max_depth=5)
+@given(some.tables(min_rows=4), some.vocabularies, st.sampled_from((Root.SELECTOR, Root.PARALLEL)))
+def test_intervals_make_a_tree_no_larger(
+    table: DemonstrationTable, vocabulary: Vocabulary, root: Root
+) -> None:
+    trained = train(table, vocabulary=vocabulary, max_depth=5)
     rules = leaf_rules(trained.tree, lambda leaf: (leaf.most_probable,))
     tree = reduced_tree(rules, root=root)
     plain = reduced_tree(rules, replace(ALL_REDUCTIONS, intervals=False), root)

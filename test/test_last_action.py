@@ -8,7 +8,12 @@ import strategies as some
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, last_actions
+from rebt_ros.demonstration.last_action import (
+    NO_ACTION,
+    ActionHistory,
+    last_actions,
+    previous_actions,
+)
 
 #: Codes of actions, demonstration after demonstration.
 recordings = st.lists(st.lists(st.integers(0, 3), max_size=12), max_size=4)
@@ -106,6 +111,47 @@ def test_a_cleared_history_knows_nothing() -> None:
     history = ActionHistory(["go", "turn"])
     history.clear()
     assert history.before() is None
+    assert history.previous is None
+
+
+@given(st.lists(st.sampled_from(some.LABELS)))
+def test_the_previous_action_is_the_one_taken_before_whether_it_differs_or_not(
+    taken: list[str],
+) -> None:
+    assert ActionHistory(taken).previous == (taken[-1] if taken else None)
+
+
+@given(st.lists(st.tuples(st.booleans(), st.sampled_from(some.LABELS))))
+def test_an_action_that_has_begun_is_in_lat_and_not_yet_the_previous_one(
+    done: list[tuple[bool, str]],
+) -> None:
+    history = ActionHistory()
+    for ended, label in done:
+        (history.take if ended else history.begin)(label)
+    begun = [label for _, label in done]
+    ended_ones = [label for ended, label in done if ended]
+    assert history.previous == (ended_ones[-1] if ended_ones else None)
+    assert history.before() == (begun[-1] if begun else None)
+    assert history.taken == ActionHistory(begun).taken
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 3), st.booleans()), max_size=20).map(
+        lambda rows: ([code for code, _ in rows], np.cumsum([anew for _, anew in rows]).tolist())
+    )
+)
+def test_the_previous_action_of_a_row_is_that_of_the_row_before_in_its_demonstration(
+    rows: tuple[list[int], list[int]],
+) -> None:
+    actions, demonstrations = rows
+    previous = previous_actions(
+        np.array(actions, dtype=np.int64), np.array(demonstrations, dtype=np.int64)
+    )
+    assert previous.dtype == np.int64
+    assert previous.tolist() == [
+        actions[row - 1] if row and demonstrations[row - 1] == demonstrations[row] else NO_ACTION
+        for row in range(len(actions))
+    ]
 
 
 def test_a_demonstration_may_begin_with_a_last_action() -> None:

@@ -17,6 +17,7 @@ from rebt_ros import evaluation, offline, pipeline
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands import learn as learn_command
 from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import OptionError
@@ -27,7 +28,7 @@ from rebt_ros.storage.tree_file import read_tree
 ALWAYS = ["decision_tree.dot", "decision_tree.svg", "tree.dot", "tree.json", "tree.svg"]
 PNG = ["decision_tree.png", "tree.png"]
 #: Fast to learn: nothing to compare.
-OPTIONS = LearnOptions(last_action=Use.NEVER, psa=Use.NEVER, max_depth=4)
+OPTIONS = LearnOptions(history=History.NONE, psa=Use.NEVER, max_depth=4)
 
 
 def rows_of(rows: int = 300, channel: str = "action", noise: float = 0.1) -> list[Row]:
@@ -104,9 +105,41 @@ def test_every_level_does_what_its_decision_tree_does() -> None:
 
 
 def test_the_chosen_level_is_the_tree_that_was_learned() -> None:
-    every = family()
+    # The simplest tree has levels of its own, and is pruned at one of those of the greedy tree.
+    every = family(replace(OPTIONS, refit=False, simplest=False))
     level = every.level(every.chosen)
     assert level.learned == replace(every.learning.learned, suggestions=())
+
+
+def test_the_chosen_level_of_the_simplest_tree_is_that_tree() -> None:
+    every = family(replace(OPTIONS, refit=False))
+    learned = every.learning.learned
+    level = every.level(every.chosen)
+    assert level.learned.tree == learned.tree
+    assert level.learned.shown == learned.shown
+    assert level.ccp_alpha <= learned.provenance.ccp_alpha
+    assert level.learned.provenance.figures == learned.provenance.figures
+
+
+def test_the_chosen_level_of_all_rows_is_judged_by_the_same_level_without_those_held_out() -> None:
+    every = family()
+    level, learning = every.level(every.chosen), every.learning
+    published, origin = learning.learned, level.learned.provenance
+    figures = published.provenance.figures
+    assert replace(level.learned, provenance=replace(origin, figures=figures)) == replace(
+        published, suggestions=()
+    )
+    held_out = learning.table.where(learning.held_out)
+    chosen = learning.judge.at(level.ccp_alpha).predict(held_out)
+    assert origin.figures.own_history_agreement == np.mean(chosen == held_out.chosen)
+
+
+def test_a_level_that_is_asked_for_is_the_one_of_the_family() -> None:
+    every = family()
+    for number in (0, len(every.ccp_alphas) // 2, len(every.ccp_alphas) - 1):
+        asked = family(replace(OPTIONS, level=number))
+        assert asked.chosen == number
+        assert every.level(number).learned == replace(asked.learning.learned, suggestions=())
 
 
 @pytest.mark.parametrize("asked", [0.0, 0.003, 10.0])
@@ -118,13 +151,13 @@ def test_a_ccp_alpha_that_was_asked_for_chooses_the_level_that_it_comes_to(asked
 
 
 def test_few_rows_have_levels_without_cross_validation() -> None:
-    every = family(rows=30)
+    every = family(rows=19)
     assert every.best is None
     assert every.level(0).cross_validated is None
 
 
 def test_large_trees_are_made_without_the_slow_reduction_and_stay_faithful() -> None:
-    every = family(LearnOptions(last_action=Use.NEVER, psa=Use.NEVER), rows=500, noise=0.5)
+    every = family(LearnOptions(history=History.NONE, psa=Use.NEVER), rows=500, noise=0.5)
     level = every.level(0)
     assert level.leaves > 48
     assert not level.reduced
@@ -140,7 +173,7 @@ def test_at_most_so_many_levels_are_selected_and_never_without_the_important_one
     most: int,
 ) -> None:
     every = family(
-        LearnOptions(last_action=Use.NEVER, psa=Use.NEVER, ccp_alpha=0.004), rows=400, noise=0.3
+        LearnOptions(history=History.NONE, psa=Use.NEVER, ccp_alpha=0.004), rows=400, noise=0.3
     )
     count = len(every.ccp_alphas)
     selected = every.selected(most)
@@ -178,9 +211,9 @@ def test_each_level_has_a_directory_with_its_tree_and_pictures(
         ET.parse(directory / "decision_tree.svg")
     chosen = next(one for one in summary if one["chosen"])
     assert read_tree(out / "levels" / chosen["level"] / "tree.json").tree == result.learned.tree
-    assert chosen["own_history_agreement"] == (
-        result.learned.provenance.figures.own_history_agreement
-    )
+    level = Family(result.learnings[0], OPTIONS).level(int(chosen["level"]))
+    figures = level.learned.provenance.figures
+    assert chosen["own_history_agreement"] == figures.own_history_agreement
 
 
 def test_the_summary_has_the_figures_of_every_level(
@@ -297,6 +330,6 @@ def test_the_command_writes_levels_on_request(
 ) -> None:
     table = csv(tmp_path / "table.csv", rows_of(rows=80))
     arguments = [str(table), "--out", str(tmp_path / "out"), "--max-depth", "3"]
-    learn_command.main([*arguments, "--last-action", "never", "--levels", "--most-levels", "4"])
+    learn_command.main([*arguments, "--history", "none", "--levels", "--most-levels", "4"])
     assert "levels/" in capsys.readouterr().out
     assert len(entries(tmp_path / "out")) <= 4

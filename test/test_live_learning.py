@@ -23,6 +23,7 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 
 from rebt_ros.behavior_tree.document import loads
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.options import LearnOptions, Use
 from rebt_ros.pipeline import Learning, learn_from
@@ -32,8 +33,8 @@ from rebt_ros.storage.inputs import load
 FIELDS = ("distance", "bearing", "battery")
 
 #: Without LAT the decision tree's prediction follows from the state alone.
-OPTIONS = LearnOptions(last_action=Use.NEVER, psa=Use.NEVER, max_depth=6, ccp_alpha=0.0, refit=True)
-PARAMETERS = {"last_action": "never", "psa": "never", "max_depth": 6, "ccp_alpha": 0.0}
+OPTIONS = LearnOptions(history=History.NONE, psa=Use.NEVER, max_depth=6, ccp_alpha=0.0, refit=True)
+PARAMETERS = {"history": "none", "psa": "never", "max_depth": 6, "ccp_alpha": 0.0}
 
 
 def _state(chance: random.Random) -> tuple[float, ...]:

@@ -21,15 +21,21 @@ from rebt_ros.behavior_tree.shown import (
     ShownValues,
     Span,
 )
+from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.shown_rows import shown_rows
 from rebt_ros.decision_tree.training import train
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.logic.conditions import Difference
 from rebt_ros.options import LearnOptions
 from rebt_ros.pipeline import learn_from
 
 X, Y = Feature("x", topic="state", index=0), Feature("y", topic="state", index=1)
 KIND = Feature("kind", FeatureKind.CATEGORICAL, ("3", "7"), topic="state", index=2)
 FEATURES = (X, Y, KIND)
+VOCABULARIES = st.builds(
+    Vocabulary, st.sampled_from(History), st.sampled_from(((), (Difference("x", "y"),)))
+)
 NEAR = ShownLeaf(5, (Span(0.0, 1.0), Span(5.0, 5.0), ("3",)))
 FAR = ShownLeaf(5, (Span(3.0, 4.0), Span(5.0, 6.0), ("3", "7")))
 
@@ -148,7 +154,7 @@ def test_no_row_that_was_learned_from_is_novel_and_one_beyond_all_rows_is(
 ) -> None:
     chosen = data.draw(st.lists(st.integers(0, 3), min_size=len(states), max_size=len(states)))
     table = some.table(states, chosen, features=FEATURES)
-    trained = train(table, last_action=data.draw(st.booleans()))
+    trained = train(table, vocabulary=data.draw(VOCABULARIES))
     shown = shown_rows(table, trained)
     assert sum(leaf.rows for leaf in shown.leaves) == len(table)
     learned = replace(some.learned(some.action("go"), FEATURES), shown=(shown,))
@@ -165,7 +171,7 @@ def test_the_ranges_are_those_of_each_leaf() -> None:
     x = (0.0, 0.2, 0.8, 1.0)
     states = [(value, 5.0, math.nan) for value in x]
     table = some.table(states, [0, 0, 2, 2], features=FEATURES)
-    shown = shown_rows(table, train(table, last_action=False))
+    shown = shown_rows(table, train(table))
     spans: list[tuple[ShownValues, ...]] = [leaf.values for leaf in shown.leaves]
     assert spans == [
         (Span(0.0, 0.2), Span(5.0, 5.0), None),
@@ -179,8 +185,8 @@ def test_the_ranges_are_those_of_each_leaf() -> None:
 
 def test_a_pruned_tree_has_the_ranges_of_the_leaves_that_are_left() -> None:
     table = some.table([(value, 5.0, 0.0) for value in range(8)], [0, 2] * 4, features=FEATURES)
-    assert len(shown_rows(table, train(table, last_action=False)).leaves) == 8
-    (leaf,) = shown_rows(table, train(table, last_action=False, ccp_alpha=1.0)).leaves
+    assert len(shown_rows(table, train(table)).leaves) == 8
+    (leaf,) = shown_rows(table, train(table, ccp_alpha=1.0)).leaves
     assert leaf == ShownLeaf(8, (Span(0.0, 7.0), Span(5.0, 5.0), ("3",)))
 
 
@@ -189,20 +195,20 @@ def test_a_tree_of_very_many_leaves_keeps_a_bounded_number_of_ranges() -> None:
     table = some.table(
         [(value, 5.0, 0.0) for value in range(rows)], [0, 2] * 500, features=FEATURES
     )
-    leaves = shown_rows(table, train(table, last_action=False)).leaves
+    leaves = shown_rows(table, train(table)).leaves
     assert len(leaves) == MOST_SHOWN_LEAVES
     assert {leaf.rows for leaf in leaves} == {4}
     spans = [leaf.values[0] for leaf in leaves]
     assert spans == [Span(first, first + 3.0) for first in range(0, rows, 4)]
     wide = tuple(Feature(f"f{place}", topic="state", index=place) for place in range(500))
     table = some.table([(row,) * 500 for row in range(100)], [0, 2] * 50, features=wide)
-    assert len(shown_rows(table, train(table, last_action=False)).leaves) == 20
+    assert len(shown_rows(table, train(table)).leaves) == 20
 
 
 def test_what_is_learned_says_what_was_shown_of_all_features_but_lagged_ones() -> None:
     states = [(row % 7, 5.0, row % 2) for row in range(60)]
     table = some.table(states, [2 * (row % 7 > 3) for row in range(60)], features=FEATURES)
-    learned = learn_from(table, LearnOptions(lags=1, refit=True)).learned
+    learned = learn_from(table, LearnOptions(lags=1)).learned
     (channel,) = learned.shown
     assert channel.channel == some.CHANNEL
     assert sum(leaf.rows for leaf in channel.leaves) == 60

@@ -7,6 +7,7 @@ import strategies as some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import FittedTree, fit, fit_parts
 from rebt_ros.demonstration.table import DemonstrationTable
 
@@ -20,16 +21,16 @@ def same(one: FittedTree, other: FittedTree) -> bool:
 
 
 @settings(max_examples=60, deadline=None)
-@given(some.tables(min_rows=2, max_rows=40), st.booleans(), st.data())
+@given(some.tables(min_rows=2, max_rows=40), some.vocabularies, st.data())
 def test_a_part_has_the_tree_of_its_own_table(
-    table: DemonstrationTable, last_action: bool, data: st.DataObject
+    table: DemonstrationTable, vocabulary: Vocabulary, data: st.DataObject
 ) -> None:
     rows = st.lists(st.booleans(), min_size=len(table), max_size=len(table)).filter(any)
     parts = [np.array(data.draw(rows)) for _ in range(3)]
-    whole, *of_parts = fit_parts(table, parts, last_action=last_action)
-    assert same(whole, fit(table, last_action=last_action))
+    whole, *of_parts = fit_parts(table, parts, vocabulary=vocabulary)
+    assert same(whole, fit(table, vocabulary=vocabulary))
     for part, fitted in zip(parts, of_parts, strict=True):
-        assert same(fitted, fit(table.where(part), last_action=last_action))
+        assert same(fitted, fit(table.where(part), vocabulary=vocabulary))
         assert table.last_where(part).tolist() == table.where(part).last.tolist()
 
 
@@ -43,4 +44,5 @@ def test_rows_that_stand_together_are_the_same_rows(
     part = table.where((place >= first) & (place < end))
     assert part.chosen.tolist() == table.chosen[first:end].tolist()
     assert part.stamps.tolist() == table.stamps[first:end].tolist()
+    assert part.previous.tolist() == table.previous[first:end].tolist()
     assert np.array_equal(part.states, table.states[first:end], equal_nan=True)

@@ -18,8 +18,16 @@ from rebt_ros.behavior_tree.drawing import Drawing, Node, Page, Text, text_width
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
 from rebt_ros.behavior_tree.picture import behavior_tree_page
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.logic.conditions import IsTrue, LastActionIs, Literal, Threshold
+from rebt_ros.logic.conditions import (
+    Difference,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    PreviousActionIs,
+    Threshold,
+)
 from rebt_ros.pictures import png
 from rebt_ros.pictures.accuracy_plot import AccuracyCurve, PlotFormat, render_accuracy_plot
 from rebt_ros.pictures.decision_tree_dot import render_decision_tree_dot
@@ -56,13 +64,11 @@ def matplotlib_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def learned(tree: nodes.Node) -> LearnedTree:
-    conditions = [one.literal.condition for one in nodes.conditions(tree)]
-    features = {one.feature for one in conditions if not isinstance(one, LastActionIs)}
     return LearnedTree(
-        tuple(map(Feature, sorted(features))),
+        tuple(map(Feature, sorted(nodes.features(tree)))),
         nodes.actions(tree),
         tree,
-        Provenance(1, 10, 0.0, None, 0.0, Root.SELECTOR, False, Figures(0, None, None, 0)),
+        Provenance(1, 10, 0.0, None, 0.0, Root.SELECTOR, History.NONE, Figures(0, None, None, 0)),
     )
 
 
@@ -83,6 +89,12 @@ decision_nodes: st.SearchStrategy[DecisionNode] = st.recursive(
             st.builds(Threshold, labels, st.floats(-1e9, 1e9)),
             st.builds(IsTrue, labels),
             st.builds(LastActionIs, labels),
+            st.builds(PreviousActionIs, labels),
+            st.builds(
+                lambda pair, value: Threshold(Difference(*pair), value),
+                st.lists(labels, min_size=2, max_size=2, unique=True),
+                st.floats(-1e9, 1e9),
+            ),
         ),
         below,
         below,

@@ -13,13 +13,15 @@ from rebt_ros import evaluation, pipeline, suggesting
 from rebt_ros.algorithms import priority_root
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
-from rebt_ros.decision_tree.training import train
+from rebt_ros.decision_tree.training import fit, train
 from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
-from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
-from rebt_ros.options import DEFAULTS, LearnOptions, Use
+from rebt_ros.logic.conditions import LastActionIs, PreviousActionIs
+from rebt_ros.options import DEFAULTS, LearnOptions
 from rebt_ros.pipeline import (
     learn,
     learn_from,
@@ -63,32 +65,92 @@ def test_a_policy_that_was_shown_is_learned() -> None:
     assert learned.provenance.rows == 120
 
 
-def test_last_actions_are_tested_only_where_that_raises_own_history_agreement() -> None:
+def test_the_previous_action_is_tested_only_where_that_raises_own_history_recall() -> None:
     auto = learn([there_and_back("one"), there_and_back("two")])
+    assert auto.provenance.history is History.PREVIOUS
     assert auto.provenance.uses_last_action
     assert auto.provenance.figures.own_history_agreement == 1.0
+    assert auto.provenance.figures.mean_recall == 1.0
     plain = learn([turning_and_going("one", 1), turning_and_going("two", 2)])
+    assert plain.provenance.history is History.NONE
     assert not plain.provenance.uses_last_action
 
 
-@pytest.mark.parametrize("use", [Use.ALWAYS, Use.NEVER])
-def test_the_use_of_last_actions_can_be_prescribed(use: Use) -> None:
-    learned = learn([there_and_back("one"), there_and_back("two")], LearnOptions(last_action=use))
-    assert learned.provenance.uses_last_action is (use is Use.ALWAYS)
+@pytest.mark.parametrize("history", History)
+def test_the_history_can_be_prescribed(history: History) -> None:
+    learned = learn([there_and_back("one"), there_and_back("two")], LearnOptions(history=history))
+    assert learned.provenance.history is history
+    tested = {type(one.literal.condition) for one in nodes.conditions(learned.tree)}
+    kinds = {History.PREVIOUS: PreviousActionIs, History.LAST: LastActionIs}
+    assert tested & {PreviousActionIs, LastActionIs} == (
+        {kinds[history]} if history in kinds else set()
+    )
 
 
-def test_a_tree_is_learned_from_the_rows_that_are_not_held_out_unless_refitted() -> None:
+def test_a_tree_says_what_its_rows_are() -> None:
+    events = [turning_and_going("one", 1), turning_and_going("two", 2)]
+    assert learn(events).row_kind is RowKind.EVENT
+    samples = [replace(one, row_kind=RowKind.SAMPLE) for one in events]
+    assert learn(samples).row_kind is RowKind.SAMPLE
+    with pytest.raises(InputError, match="the rows of one are events and those of two are samples"):
+        learn([events[0], samples[1]])
+
+
+def test_everything_shown_is_learned_from_and_judged_before_that() -> None:
     # The second demonstration contradicts the first one.
     first = demonstration("one", [(float(x), "go" if x < 5 else "turn") for x in range(10)])
     second = demonstration("two", [(float(x), "turn" if x < 5 else "go") for x in range(10)])
     third = demonstration("three", [(float(x), "turn" if x < 5 else "go") for x in range(10)])
-    never = Use.NEVER
-    options = LearnOptions(test_fraction=0.6, last_action=never)
-    held = learn([first, second, third], options)
+    options = LearnOptions(test_fraction=0.6, history=History.NONE)
+    held = learn([first, second, third], replace(options, refit=False))
     assert held.provenance.figures.own_history_agreement == 0.0
-    refitted = learn([first, second, third], replace(options, refit=True))
+    assert held.provenance.figures.mean_recall == 0.0
+    assert (held.provenance.rows, held.provenance.demonstrations) == (10, 1)
+    refitted = learn([first, second, third], options)
     assert refitted.provenance.figures.own_history_agreement == 0.0
+    assert refitted.provenance.figures.held_out_rows == 20
+    # What is counted is what was learned from.
+    assert (refitted.provenance.rows, refitted.provenance.demonstrations) == (30, 3)
+    assert sum(leaf.rows for channel in refitted.shown for leaf in channel.leaves) == 30
     assert refitted.tree != held.tree
+    # Two of three say so.
+    (table,) = tabulate([second])
+    assert (evaluation.own_history_choices(refitted.tree, table) == table.chosen).all()
+
+
+def test_the_end_of_the_only_demonstration_is_learned_too() -> None:
+    shown = demonstration("one", [(float(x), "go" if x < 35 else "dock") for x in range(40)])
+    learned = learn([shown])
+    assert learned.provenance.rows == 40
+    assert learned.provenance.figures.held_out_rows == 10
+    assert learned.provenance.figures.own_history_agreement == 0.5
+    assert "dock" in {action.label for action in nodes.actions(learned.tree)}
+    paper = learn([shown], replace(LearnOptions(), refit=False))
+    assert "dock" not in {action.label for action in nodes.actions(paper.tree)}
+
+
+def test_figures_are_those_of_the_tree_that_was_learned_without_the_rows() -> None:
+    table = tabulate([turning_and_going(str(seed), seed) for seed in range(4)])[0]
+    learning = learn_from(table)
+    held_out = table.where(learning.held_out)
+    assert len(held_out) == 60
+    without = fit(table.where(~learning.held_out), vocabulary=learning.judge.vocabulary)
+    assert learning.judge.at(0.0).tree == without.at(0.0).tree
+    figures = learning.learned.provenance.figures
+    own = learning.judge.at(learning.policy.ccp_alpha).predict(held_out)
+    assert figures.own_history_agreement == pytest.approx(np.mean(own == held_out.chosen))
+
+
+def test_figures_of_the_papers_mode_are_those_of_rows_that_it_was_not_learned_from() -> None:
+    shown = [there_and_back("one"), there_and_back("two"), there_and_back("three")]
+    learned = learn(shown, LearnOptions.paper())
+    assert learned.provenance.history is History.LAST
+    assert (learned.provenance.rows, learned.provenance.demonstrations) == (120, 2)
+    assert learned.provenance.figures.held_out_rows == 60
+    assert not any(
+        isinstance(one.literal.condition, PreviousActionIs)
+        for one in nodes.conditions(learned.tree)
+    )
 
 
 def test_nothing_is_judged_where_nothing_is_held_out() -> None:
@@ -138,7 +200,7 @@ def test_one_action_only_on_one_of_two_channels_is_refused_with_its_name() -> No
 
 def test_demonstrations_without_features_are_decided_by_their_majority() -> None:
     rows = [Row(t, "action", label, None, ()) for t, label in enumerate("aabab")]
-    learned = learn([Demonstration.from_rows("one", (), rows)], LearnOptions(last_action=Use.NEVER))
+    learned = learn([Demonstration.from_rows("one", (), rows)], LearnOptions(history=History.NONE))
     assert [action.label for action in learned.actions] == ["a", "b"]
 
 
@@ -154,6 +216,11 @@ def test_demonstrations_without_features_are_decided_by_their_majority() -> None
         {"random_state": -1},
         {"lags": -1},
         {"lags": 21},
+        {"level": -1},
+        {"level": 1, "ccp_alpha": 0.1},
+        {"reaction_time": -0.1},
+        {"reaction_time": 5.1},
+        {"reaction_time": float("nan")},
     ],
 )
 def test_options_out_of_range_are_refused_by_name(wrong: dict[str, float]) -> None:
@@ -210,7 +277,7 @@ def test_routines_that_are_left_out_are_counted_also_where_the_tree_is_too_large
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     table = tabulate([there_and_back("one")])[0]
-    trained = train(table, last_action=False)
+    trained = train(table)
     subtree = nodes.Sequence((nodes.Action("go", "action"), nodes.Action("turn", "action")))
     routines = [FoundRoutine(subtree, support, support) for support in range(10, 0, -1)]
     monkeypatch.setattr(suggesting, "MOST_LEAVES_MINIMIZED", 0)

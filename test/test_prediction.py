@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from rebt_ros.behavior_tree import nodes, prediction
 from rebt_ros.behavior_tree.prediction import (
     States,
+    as_it_stands,
     choose,
-    last_action_column,
-    last_action_of,
+    history_columns,
     triggered,
 )
 from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import LastActionIs, Literal
+from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
 
@@ -47,7 +47,7 @@ def first_ticks(
 def test_what_is_triggered_is_what_a_first_tick_takes(
     tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
 ) -> None:
-    history = last_action_of(ActionHistory(earlier))
+    history = as_it_stands(ActionHistory(earlier))
     ticked = triggered(tree, States(some.FEATURES, values(drawn), history))
     assert tuple(ticked) == nodes.actions(tree)
     for row, actions in enumerate(first_ticks(tree, drawn, earlier)):
@@ -59,7 +59,7 @@ def test_what_is_triggered_is_what_a_first_tick_takes(
 def test_what_is_chosen_is_the_first_action_that_the_tree_names_of_those_taken(
     tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
 ) -> None:
-    states = States(some.FEATURES, values(drawn), last_action_of(ActionHistory(earlier)))
+    states = States(some.FEATURES, values(drawn), as_it_stands(ActionHistory(earlier)))
     chosen = choose(tree, some.ACTIONS, states)
     assert chosen.dtype == np.int64
     for code, actions in zip(chosen.tolist(), first_ticks(tree, drawn, earlier), strict=True):
@@ -72,10 +72,12 @@ def test_what_is_chosen_is_the_first_action_that_the_tree_names_of_those_taken(
 def test_many_rows_in_parts_are_like_all_at_once(
     tree: nodes.Node, drawn: list[tuple[float, ...]], size: int, data: st.DataObject
 ) -> None:
-    codes = st.integers(NO_ACTION, len(some.LABELS) - 1)
-    last = data.draw(st.lists(codes, min_size=len(drawn), max_size=len(drawn)))
-    column = last_action_column(some.LABELS, np.array(last, dtype=np.int64))
-    states = [States(some.FEATURES, values(drawn), column) for _ in range(4)]
+    codes = st.lists(
+        st.integers(NO_ACTION, len(some.LABELS) - 1), min_size=len(drawn), max_size=len(drawn)
+    )
+    previous, last = (np.array(data.draw(codes), dtype=np.int64) for _ in range(2))
+    columns = history_columns(some.LABELS, previous, last)
+    states = [States(some.FEATURES, values(drawn), columns) for _ in range(4)]
     whole, ticked = choose(tree, some.ACTIONS, states[0]), triggered(tree, states[1])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(prediction, "_ROWS_AT_A_TIME", size)
@@ -91,7 +93,7 @@ def test_many_rows_in_parts_are_like_all_at_once(
 def test_what_a_tree_of_rules_chooses_is_what_its_tick_takes(
     tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
 ) -> None:
-    states = States(some.FEATURES, values(drawn), last_action_of(ActionHistory(earlier)))
+    states = States(some.FEATURES, values(drawn), as_it_stands(ActionHistory(earlier)))
     for code, actions in zip(
         choose(tree, some.ACTIONS, states).tolist(),
         first_ticks(tree, drawn, earlier),
@@ -102,39 +104,66 @@ def test_what_a_tree_of_rules_chooses_is_what_its_tick_takes(
 
 @settings(max_examples=60)
 @given(some.literals(), some.tables(max_rows=12))
-def test_literals_hold_where_their_definition_says_with_lat_from_a_column(
+def test_literals_hold_where_their_definition_says_with_the_history_from_columns(
     literal: Literal, table: DemonstrationTable
 ) -> None:
-    column = last_action_column(table.actions, table.last)
-    satisfied = States(table.features, table.states, column).satisfy(literal)
+    columns = history_columns(table.actions, table.previous, table.last)
+    satisfied = States(table.features, table.states, columns).satisfy(literal)
     labels = dict(enumerate(table.actions))
     assert satisfied.tolist() == [
-        some.holds(literal, state, labels.get(last))
-        for state, last in zip(table.states.tolist(), table.last.tolist(), strict=True)
+        some.holds(literal, state, labels.get(last), labels.get(previous))
+        for state, last, previous in zip(
+            table.states.tolist(), table.last.tolist(), table.previous.tolist(), strict=True
+        )
     ]
 
 
 def test_a_column_of_lat_is_read_whatever_is_decided() -> None:
-    states = States(some.FEATURES, np.zeros((3, 4)), last_action_column(("go", "turn"), LAST))
+    states = States(some.FEATURES, np.zeros((3, 4)), COLUMNS)
     for deciding in ((), ("turn",), ("go", "turn")):
         after_go = Literal(LastActionIs("go", deciding))
         assert states.satisfy(after_go).tolist() == [False, True, False]
         assert states.satisfy(~after_go).tolist() == [True, False, True]
 
 
-LAST = np.array([NO_ACTION, 0, 1])
+#: First the previous action, then LAT.
+COLUMNS = history_columns(("go", "turn"), np.array([1, NO_ACTION, 0]), np.array([NO_ACTION, 0, 1]))
 
 
-def test_an_action_that_the_column_does_not_know_was_never_the_last_one() -> None:
-    states = States(some.FEATURES, np.zeros((3, 4)), last_action_column(("go", "turn"), LAST))
-    never = Literal(LastActionIs("grasp"))
+def test_the_previous_action_has_a_column_of_its_own() -> None:
+    states = States(some.FEATURES, np.zeros((3, 4)), COLUMNS)
+    doing_go = Literal(PreviousActionIs("go"))
+    assert states.satisfy(doing_go).tolist() == [False, False, True]
+    assert states.satisfy(~doing_go).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize("condition", [LastActionIs("grasp"), PreviousActionIs("grasp")])
+def test_an_action_that_a_column_does_not_know_was_never_done_before(
+    condition: LastActionIs | PreviousActionIs,
+) -> None:
+    states = States(some.FEATURES, np.zeros((3, 4)), COLUMNS)
+    never = Literal(condition)
     assert not states.satisfy(never).any()
     assert states.satisfy(~never).all()
 
 
+def test_a_history_as_it_stands_tells_the_previous_action_and_lat_apart() -> None:
+    history = ActionHistory(["turn", "go"])
+    states = States(some.FEATURES, np.zeros((2, 4)), as_it_stands(history))
+    assert states.satisfy(Literal(PreviousActionIs("go"))).all()
+    assert states.satisfy(Literal(LastActionIs("turn", ("go",)))).all()
+    # It has begun, and is in LAT, but nothing has ended since.
+    history.begin("wait")
+    assert states.satisfy(Literal(PreviousActionIs("go"))).all()
+    assert states.satisfy(Literal(LastActionIs("wait"))).all()
+    history.clear()
+    for condition in (PreviousActionIs("go"), LastActionIs("wait")):
+        assert not states.satisfy(Literal(condition)).any()
+
+
 def test_a_condition_that_is_tested_again_gives_the_same_answer() -> None:
     drawn = values([(0.1, 0, 0, 0), (0.9, 0, 0, 0)])
-    states = States(some.FEATURES, drawn, last_action_of(ActionHistory()))
+    states = States(some.FEATURES, drawn, as_it_stands(ActionHistory()))
     near = some.at_most("distance", 0.3)
     twice = nodes.Sequence((some.when(~near, then=GO), some.when(near, then=TURN)))
     triggered(twice, states)
@@ -156,11 +185,11 @@ def test_a_condition_that_is_tested_again_gives_the_same_answer() -> None:
     ],
 )
 def test_known_trees(tree: nodes.Node, chosen: int) -> None:
-    states = States(some.FEATURES, np.zeros((2, 4)), last_action_of(ActionHistory()))
+    states = States(some.FEATURES, np.zeros((2, 4)), as_it_stands(ActionHistory()))
     assert choose(tree, some.ACTIONS, states).tolist() == [chosen] * 2
 
 
 def test_no_rows_give_no_choices() -> None:
-    states = States(some.FEATURES, np.empty((0, 4)), last_action_of(ActionHistory()))
+    states = States(some.FEATURES, np.empty((0, 4)), as_it_stands(ActionHistory()))
     assert choose(GO, some.ACTIONS, states).tolist() == []
     assert len(states) == 0

@@ -8,10 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.tree import DecisionTreeClassifier
 
-from rebt_ros.decision_tree.encoding import encode
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary, encode
 from rebt_ros.decision_tree.training import fit
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Difference
 
 
 def noisy_table(seed: int, rows: int, decimals: int = 1) -> DemonstrationTable:
@@ -36,13 +38,18 @@ tables = st.builds(
 )
 
 
+vocabularies = st.builds(
+    Vocabulary, st.sampled_from(History), st.sampled_from(((), (Difference("a", "b"),)))
+)
+
+
 @settings(max_examples=25, deadline=None)
-@given(table=tables, last_action=st.booleans(), max_depth=st.sampled_from((None, 3)))
+@given(table=tables, vocabulary=vocabularies, max_depth=st.sampled_from((None, 3)))
 def test_every_level_equals_scikit_learns_own_fit_at_its_alpha(
-    table: DemonstrationTable, last_action: bool, max_depth: int | None
+    table: DemonstrationTable, vocabulary: Vocabulary, max_depth: int | None
 ) -> None:
-    fitted = fit(table, last_action=last_action, max_depth=max_depth)
-    matrix = encode(table, last_action)
+    fitted = fit(table, vocabulary=vocabulary, max_depth=max_depth)
+    matrix = encode(table, vocabulary)
     for ccp_alpha in fitted.path.alphas:
         own = DecisionTreeClassifier(max_depth=max_depth, ccp_alpha=ccp_alpha, random_state=0)
         own.fit(matrix, table.chosen)
@@ -57,9 +64,9 @@ def test_the_levels_are_the_positive_alphas_of_scikit_learns_path(
     table: DemonstrationTable,
 ) -> None:
     path = DecisionTreeClassifier(random_state=0).cost_complexity_pruning_path(
-        encode(table, last_action=False), table.chosen
+        encode(table, FEATURES_ALONE), table.chosen
     )
-    alphas = fit(table, last_action=False).path.alphas
+    alphas = fit(table).path.alphas
     assert alphas[0] == 0.0
     assert (np.diff(alphas) > 0).all()
     np.testing.assert_allclose(
@@ -68,20 +75,22 @@ def test_the_levels_are_the_positive_alphas_of_scikit_learns_path(
 
 
 @settings(max_examples=25, deadline=None)
-@given(table=tables, other=tables)
-def test_agreements_of_all_levels_at_once_equal_those_of_each_tree(
-    table: DemonstrationTable, other: DemonstrationTable
+@given(table=tables, other=tables, vocabulary=vocabularies)
+def test_hits_of_all_levels_at_once_equal_those_of_each_tree(
+    table: DemonstrationTable, other: DemonstrationTable, vocabulary: Vocabulary
 ) -> None:
-    fitted = fit(table, last_action=True)
+    fitted = fit(table, vocabulary=vocabulary)
     # Between the levels as well as on them, and beyond the last one.
     alphas = np.unique(np.concatenate((fitted.path.alphas, fitted.path.alphas * 1.5, [0.7])))
-    each = [np.mean(fitted.at(one).predict(other) == other.chosen) for one in alphas]
-    np.testing.assert_allclose(fitted.agreements(other, alphas), each)
+    each = [other.chosen[fitted.at(one).predict(other) == other.chosen] for one in alphas]
+    assert fitted.hits(other, alphas).tolist() == [
+        np.bincount(right, minlength=len(other.actions)).tolist() for right in each
+    ]
 
 
 def test_the_last_level_is_a_single_leaf_with_the_most_frequent_action() -> None:
     table = noisy_table(1, 100)
-    fitted = fit(table, last_action=False)
+    fitted = fit(table)
     last = fitted.at(float(fitted.path.alphas[-1]))
     assert [len(conjunction) for conjunction, _ in last.tree.paths()] == [0]
     assert (last.predict(table) == np.bincount(table.chosen).argmax()).all()
@@ -91,4 +100,4 @@ def test_the_last_level_is_a_single_leaf_with_the_most_frequent_action() -> None
 def test_a_tree_without_splits_has_one_level(rows: int) -> None:
     table = noisy_table(3, rows)
     same = table.where(table.chosen == table.chosen[0])
-    assert fit(same, last_action=False).path.alphas.tolist() == [0.0]
+    assert fit(same).path.alphas.tolist() == [0.0]

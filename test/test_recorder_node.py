@@ -12,12 +12,14 @@ import pytest
 pytest.importorskip("rclpy")
 
 from builtin_interfaces.msg import Time
-from ros_processes import NodeProcess, Peer, own_domain, values_of
+from ros_processes import LATCHED, NodeProcess, Peer, own_domain, values_of
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Bool, String
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.last_action import last_actions
 from rebt_ros.storage.recording import is_recording, read_recording, recordings
+from rebt_ros.storage.recording_head import Origin, read_head
 
 #: The tests' robots do not send states all the time: their last actions would wait for the next.
 PROMPT: dict[str, object] = {"state_wait": 0.2}
@@ -120,6 +122,47 @@ def test_a_discarded_demonstration_leaves_no_file(domain: int, peer: Peer, tmp_p
         assert not peer.call("/recorder/new_demonstration").success
     (demonstration,) = _recorded(tmp_path / "demonstrations")
     assert _actions(demonstration) == ["right"]
+
+
+def test_what_failed_is_shown_next_and_a_takeover_of_it_is_set_aside(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    def counted(**values: str) -> None:
+        wanted = {key.replace("_", " "): value for key, value in values.items()}
+        peer.wait_until(
+            lambda: (
+                (one := peer.diagnostics.get("recorder: recording"))
+                and wanted.items() <= values_of(one).items()
+            ),
+            what=str(wanted),
+        )
+
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT):
+        peer.state(1.0)
+        peer.connect(Bool, "executor/driving", LATCHED)
+        peer.publish(Bool(data=True), "executor/driving")
+        peer.publish(String(data="turn"), "command")
+        peer.action("stop")
+        counted(takeovers="1", rows="1", origin_of_the_demonstration="takeover")
+        answer = peer.call("/recorder/failed")
+        assert answer.success
+        assert answer.message.startswith("the takeover did not help and is set aside: 1 row in ")
+        assert answer.message.endswith(
+            "Now disable the executor, put the robot back to where the episode began, or leave it "
+            "where it is, and show how it is done, to the end; then call ~/new_demonstration."
+        )
+        peer.action("go")
+        peer.action("go")
+        counted(takeovers="1", failed_episodes="1", rows="3", origin_of_the_demonstration="failed")
+        assert "recorded 2 rows in " in peer.call("/recorder/record", False).message
+    (demonstration,) = _recorded(tmp_path / "demonstrations")
+    assert _actions(demonstration) == ["go", "go"]
+    assert demonstration.before == {}
+    (path,) = recordings(tmp_path / "demonstrations")
+    with path.open("rb") as file:
+        assert read_head(path, file).origin is Origin.FAILED
+    (aside,) = tmp_path.glob("demonstrations/*.rec.failed")
+    assert _actions(read_recording(aside).demonstration) == ["stop"]
 
 
 def test_nothing_is_recorded_until_asked_for(domain: int, peer: Peer, tmp_path: Path) -> None:

@@ -146,16 +146,19 @@ def test_the_end_leaves_out_actions_whose_states_have_not_come(desk: Desk) -> No
     assert desk.rows() == [(3.0, "a3")]
 
 
-def test_nothing_from_before_the_start_is_taken_for_a_state_of_later(desk: Desk) -> None:
+@pytest.mark.parametrize("begin", ["start", "fail"])
+def test_nothing_from_before_the_start_is_taken_for_a_state_of_later(
+    desk: Desk, begin: str
+) -> None:
     for number in range(5):
         desk.state(number)
     desk.settle()
-    desk.node._session.stop()
+    desk.node._session.stop(BEGIN)
     desk.settle()
     for number in range(5, 9):
         desk.state(number)
     desk.settle()
-    desk.node._session.start(BEGIN)
+    getattr(desk.node._session, begin)(BEGIN)
     # Sent while nothing was recorded: it belongs to no demonstration.
     desk.action(4, late=20)
     desk.action(7, late=20)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from recording_examples import FEATURES, ROWS, assert_same
 
 from rebt_ros.demonstration.builder import LARGEST_VALUE
-from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError
 from rebt_ros.storage import recording, recording_rows
@@ -27,6 +27,7 @@ from rebt_ros.storage.recording import (
     read_recording,
     recordings,
 )
+from rebt_ros.storage.recording_head import Head, Origin, read_head
 from rebt_ros.storage.recording_rows import LABEL, record_type
 
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -90,6 +91,7 @@ def test_numpy_alone_reads_a_recording_as_documented(tmp_path):
     assert head == {
         "version": 2,
         "sample_rate": None,
+        "origin": "demonstration",
         "features": [
             {"name": "front", "topic": "/state", "index": 0},
             {"name": 'left, "near"', "topic": "/state", "index": 1},
@@ -184,6 +186,35 @@ def test_a_discarded_recording_is_removed(tmp_path):
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(ValueError, match="closed"):
         writer.write(ROWS[0])
+
+
+def test_a_recording_that_is_set_aside_is_kept_and_passed_over(tmp_path):
+    kept = written(tmp_path)
+    with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:
+        name = writer.path.name
+        writer.write(ROWS[0])
+        writer.set_aside()
+        writer.set_aside()
+    assert writer.path == tmp_path / f"{name}.failed"
+    assert recordings(tmp_path) == (kept,)
+    assert len(read_recording(writer.path).demonstration) == 1
+    with pytest.raises(ValueError, match="closed"):
+        writer.write(ROWS[1])
+
+
+def test_an_empty_recording_that_is_set_aside_is_removed(tmp_path):
+    with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:
+        writer.set_aside()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_that_cannot_be_set_aside_is_an_error(tmp_path):
+    with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:
+        writer.write(ROWS[0])
+        (tmp_path / f"{writer.path.name}.failed" / "in the way").mkdir(parents=True)
+        with pytest.raises(RecordingError, match=r"cannot be set aside .*: move it elsewhere"):
+            writer.set_aside()
+    assert recordings(tmp_path) == (writer.path,)
 
 
 def test_a_full_disk_cuts_the_partial_row_off_and_keeps_the_rows_before(tmp_path, monkeypatch):
@@ -349,6 +380,22 @@ def test_what_no_recorder_writes_is_named_in_one_sentence(tmp_path, change, mess
         (b'"index": 0', b'"index": null', "needs both a topic and an index"),
         (b'"topic": "/state", "index": 0', b'"index": true', "is not a feature"),
         (b'["/action"]', b'["/action", "/action"]', "two channels have the same name"),
+        (b'rate": null', b'rate": true', "its sample rate is True, not null or a positive number"),
+        (b'rate": null', b'rate": "10"', "its sample rate is '10'"),
+        (b'rate": null', b'rate": [10]', "its sample rate is \\[10\\]"),
+        (b'rate": null', b'rate": 0', "its sample rate is 0,"),
+        (b'rate": null', b'rate": -1.5', "its sample rate is -1.5,"),
+        (b'rate": null', b'rate": NaN', "its sample rate is nan,"),
+        (b'rate": null', b'rate": Infinity', "its sample rate is inf,"),
+        (b'rate": null', b'rate": 1' + b"0" * 400, "its sample rate is 1000"),
+        (b'rate": null', b'rate": 1' + b"0" * 5000, "cannot be read"),
+        (
+            b'"origin": "demonstration"',
+            b'"origin": "robot"',
+            "its origin is 'robot', not demonstration, takeover, failed: use the version",
+        ),
+        (b'"origin": "demonstration"', b'"origin": null', "its origin is None"),
+        (b'"origin": "demonstration"', b'"origin": ["failed"]', "its origin is \\['failed'\\]"),
         (b"recording {", b"recording ", "cannot be read"),
         (b"recording {", b"recording " + b"[" * 100_000, "nested too deeply"),
         (b"# rebt_ros recording", b"# something", "is not a recording"),
@@ -445,3 +492,47 @@ def test_the_last_action_of_a_first_row_is_read_back(tmp_path: Path) -> None:
     demonstration = read_recording(writer.path).demonstration
     assert demonstration.before == {"base": "turn"}
     assert demonstration.actions == ("drop", "go", "lift", "stop")
+
+
+def head_of(path: Path) -> Head:
+    with path.open("rb") as file:
+        return read_head(path, file)
+
+
+@pytest.mark.parametrize("origin", list(Origin))
+def test_why_a_demonstration_was_shown_is_in_its_first_line(tmp_path: Path, origin: Origin) -> None:
+    with RecordingWriter(tmp_path, FEATURES, ["/action"], origin=origin) as writer:
+        writer.write(ROWS[0])
+    assert head_of(writer.path).origin is origin
+    assert f'"origin": "{origin.value}"'.encode() in writer.path.read_bytes()
+    assert len(read_recording(writer.path).demonstration) == 1
+
+
+def test_a_recording_that_does_not_say_why_it_was_shown_is_a_demonstration(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b'"origin": "demonstration", ', b"", 1))
+    assert path.read_bytes() != content
+    assert head_of(path).origin is Origin.DEMONSTRATION
+    assert len(read_recording(path).demonstration) == len(ROWS)
+
+
+@pytest.mark.parametrize(
+    ("sample_rate", "kind"),
+    [(None, RowKind.EVENT), (10.0, RowKind.SAMPLE), (1, RowKind.SAMPLE), (0.5, RowKind.SAMPLE)],
+)
+def test_what_a_row_is_follows_from_the_sample_rate(
+    tmp_path: Path, sample_rate: float | None, kind: RowKind
+) -> None:
+    with RecordingWriter(tmp_path, FEATURES, ["/action"], sample_rate=sample_rate) as writer:
+        writer.write(ROWS[0])
+    assert head_of(writer.path).sample_rate == sample_rate
+    assert head_of(writer.path).row_kind is kind
+    assert read_recording(writer.path).demonstration.row_kind is kind
+
+
+def test_without_a_word_on_the_sample_rate_a_row_is_an_event(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    path.write_bytes(path.read_bytes().replace(b'"sample_rate": null, ', b"", 1))
+    assert head_of(path).sample_rate is None
+    assert read_recording(path).demonstration.row_kind is RowKind.EVENT

@@ -12,6 +12,7 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.ros import recording_session
 from rebt_ros.ros.recording_session import RecordingSession
+from rebt_ros.storage.recording_head import Origin
 
 
 class Disk:
@@ -22,9 +23,9 @@ class Disk:
         self.full = False
         self.syncs = 0
 
-    def open(self, features: tuple[Feature, ...]) -> File:
+    def open(self, features: tuple[Feature, ...], origin: Origin) -> File:
         self.check()
-        self.files.append(File(self, features))
+        self.files.append(File(self, features, origin))
         return self.files[-1]
 
     def check(self) -> None:
@@ -33,9 +34,10 @@ class Disk:
 
 
 class File:
-    def __init__(self, disk: Disk, features: tuple[Feature, ...]) -> None:
+    def __init__(self, disk: Disk, features: tuple[Feature, ...], origin: Origin) -> None:
         self._disk = disk
         self.features = features
+        self.origin = origin
         self.path = Path("file")
         self.written: list[Row] = []
         self.end = ""
@@ -53,7 +55,12 @@ class File:
         self._disk.syncs += 1
 
     def close(self) -> None:
+        self._disk.check()
         self.end = "closed"
+
+    def set_aside(self) -> None:
+        self._disk.check()
+        self.end = "aside"
 
     def discard(self) -> None:
         self.end = "discarded"
@@ -79,6 +86,13 @@ class Desk:
             for file in self.disk.files
         ]
 
+    def actions(self) -> list[tuple[Origin, list[str], str]]:
+        """Of each file its origin, its actions, and how it ended."""
+        return [
+            (file.origin, [row.action for row in file.written], file.end)
+            for file in self.disk.files
+        ]
+
 
 @pytest.fixture(autouse=True)
 def _retry_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,7 +113,7 @@ def test_no_file_is_opened_without_a_row() -> None:
     desk = Desk()
     desk.session.start(0)
     desk.session.observe(1, "state", [1.0], [])
-    answer = desk.session.stop()
+    answer = desk.session.stop(2)
     assert (answer.success, "no rows" in answer.message) == (True, True)
     assert desk.disk.files == []
 
@@ -262,3 +276,270 @@ def test_who_drives_is_known_also_while_nothing_is_recorded() -> None:
     desk.session.start(SECOND + 1)
     desk.session.act(SECOND + 2, "action", "go")
     assert desk.rows() == [[("go", None, (1.0,))]]
+
+
+TENTH = SECOND // 10
+DEMONSTRATION, TAKEOVER, FAILED = Origin.DEMONSTRATION, Origin.TAKEOVER, Origin.FAILED
+
+
+def desk_with_state(sample_rate: float | None = None, *, recording: bool = True) -> Desk:
+    desk = Desk(sample_rate)
+    if recording:
+        desk.session.start(0)
+    desk.session.observe(1, "state", [1.0], [])
+    return desk
+
+
+def hold(desk: Desk, start: int, end: int, value: float = 1.0) -> None:
+    """Nothing but states, every tenth of a second from one to the other, in tenths."""
+    for number in range(start, end):
+        desk.session.observe(number * TENTH, "state", [value], [])
+
+
+def test_what_failed_is_shown_while_nothing_was_recorded() -> None:
+    desk = desk_with_state(recording=False)
+    desk.session.act(2, "action", "before")
+    answer = desk.session.fail(3)
+    assert answer.success
+    assert answer.message == (
+        "recording. Now put the robot back to where the episode began, or leave it where it is, "
+        "and show how it is done, to the end; then call ~/new_demonstration."
+    )
+    assert (desk.session.recording, desk.session.awaited, desk.session.failed) == (True, True, 1)
+    desk.session.act(4, "action", "go")
+    assert not desk.session.awaited
+    desk.session.renew(5)
+    desk.session.act(6, "action", "turn")
+    assert desk.actions() == [(FAILED, ["go"], "closed"), (DEMONSTRATION, ["turn"], "")]
+
+
+def test_what_failed_ends_the_demonstration_under_way_and_keeps_its_rows() -> None:
+    desk = desk_with_state()
+    desk.session.act(2, "action", "go")
+    desk.session.act(3, "action", "turn")
+    answer = desk.session.fail(4)
+    assert answer.success
+    assert answer.message.startswith("recorded 2 rows in file. Now put the robot back")
+    desk.session.act(5, "action", "go")
+    assert desk.actions() == [
+        (DEMONSTRATION, ["go", "turn"], "closed"),
+        (FAILED, ["go"], ""),
+    ]
+    assert desk.rows()[1] == [("go", None, (1.0,))]
+    assert desk.session.rows == 3
+
+
+@pytest.mark.parametrize("disabled", [True, False])
+def test_what_failed_while_the_executor_drives_begins_with_what_a_person_does(
+    disabled: bool,
+) -> None:
+    desk = desk_with_state()
+    desk.session.drive(2, True)
+    desk.session.command(3, "action", "turn")
+    answer = desk.session.fail(4)
+    assert "Now disable the executor, put the robot back" in answer.message
+    desk.session.command(1 * SECOND, "action", "stop")
+    if disabled:
+        desk.session.drive(2 * SECOND, False)
+        # Was under way when the executor was disabled.
+        desk.session.command(2 * SECOND + 1, "action", "stop")
+    assert desk.disk.files == []
+    assert desk.session.awaited
+    desk.session.act(3 * SECOND, "action", "go")
+    desk.session.act(4 * SECOND, "action", "go")
+    # Neither does LAT know of what the executor did, nor is it a takeover.
+    assert desk.rows() == [[("go", None, (1.0,)), ("go", None, (1.0,))]]
+    assert desk.actions() == [(FAILED, ["go", "go"], "")]
+    assert (desk.session.takeovers, desk.session.failed) == (0, 1)
+
+
+def test_what_failed_ends_where_the_executor_drives_again() -> None:
+    desk = desk_with_state()
+    desk.session.drive(2, True)
+    desk.session.fail(3)
+    desk.session.act(1 * SECOND, "action", "go")
+    desk.session.drive(2 * SECOND, True)
+    desk.session.act(3 * SECOND, "action", "stop")
+    assert desk.actions() == [(FAILED, ["go"], "closed"), (TAKEOVER, ["stop"], "")]
+    assert desk.session.takeovers == 1
+
+
+def test_a_takeover_in_an_episode_that_failed_is_kept_and_not_learned_from() -> None:
+    desk = desk_with_state()
+    desk.session.drive(2, True)
+    desk.session.act(1 * SECOND, "action", "stop")
+    answer = desk.session.fail(2 * SECOND)
+    assert answer.success
+    assert answer.message.startswith(
+        "the takeover did not help and is set aside: 1 row in file. Now disable the executor,"
+    )
+    # It waits for no longer than its takeover_timeout.
+    desk.session.drive(3 * SECOND, True)
+    assert desk.session.awaited
+    desk.session.act(4 * SECOND, "action", "go")
+    assert desk.actions() == [(TAKEOVER, ["stop"], "aside"), (FAILED, ["go"], "")]
+    assert desk.rows()[1] == [("go", None, (1.0,))]
+    # A takeover of an episode before is not concerned.
+    desk.session.drive(5 * SECOND, True)
+    desk.session.act(6 * SECOND, "action", "turn")
+    desk.session.drive(7 * SECOND, True)
+    desk.session.fail(8 * SECOND)
+    assert desk.actions()[-1] == (TAKEOVER, ["turn"], "closed")
+
+
+def test_a_takeover_without_rows_leaves_nothing_to_set_aside() -> None:
+    desk = Desk()
+    desk.session.start(0)
+    desk.session.drive(1, True)
+    desk.session.act(2, "action", "go")
+    assert desk.session.origin is TAKEOVER
+    answer = desk.session.fail(3)
+    assert answer.success
+    assert answer.message.startswith("no rows were recorded. Now disable the executor,")
+
+
+def test_what_failed_twice_is_awaited_still_and_what_was_shown_is_kept() -> None:
+    desk = desk_with_state()
+    assert desk.session.fail(2).success
+    assert desk.session.fail(3).success
+    assert desk.session.awaited
+    desk.session.act(4, "action", "go")
+    assert desk.session.fail(5).message.startswith("recorded 1 row in file. Now put")
+    desk.session.act(6, "action", "turn")
+    assert desk.actions() == [(FAILED, ["go"], "closed"), (FAILED, ["turn"], "")]
+    assert desk.rows()[1] == [("turn", None, (1.0,))]
+    assert desk.session.failed == 3
+
+
+def test_what_failed_before_any_state_is_shown_once_there_is_one() -> None:
+    desk = Desk()
+    desk.session.fail(1)
+    desk.session.act(2, "action", "too early")
+    assert desk.faults == ["action before the first state"]
+    desk.session.drive(3, True)
+    desk.session.observe(4, "state", [1.0], [])
+    desk.session.act(1 * SECOND, "action", "go")
+    assert desk.actions() == [(FAILED, ["go"], "")]
+    assert desk.session.takeovers == 0
+
+
+@pytest.mark.parametrize("end", ["renew", "stop"])
+def test_nobody_has_to_show_what_failed(end: str) -> None:
+    desk = desk_with_state()
+    desk.session.drive(2, True)
+    desk.session.fail(3)
+    assert getattr(desk.session, end)(4).success
+    desk.session.start(5)
+    assert not desk.session.awaited
+    desk.session.act(6, "action", "go")
+    assert desk.actions() == [(TAKEOVER, ["go"], "")]
+
+
+def test_what_was_shown_badly_of_what_failed_is_discarded_and_shown_again() -> None:
+    desk = desk_with_state()
+    desk.session.fail(2)
+    desk.session.act(3, "action", "wrong")
+    assert desk.session.discard(4).success
+    assert desk.session.awaited
+    desk.session.act(5, "action", "right")
+    assert desk.actions() == [(FAILED, ["wrong"], "discarded"), (FAILED, ["right"], "")]
+
+
+def test_a_disk_that_refuses_what_came_before_does_not_keep_a_person_from_showing() -> None:
+    desk = desk_with_state()
+    desk.session.act(2, "action", "go")
+    desk.disk.full = True
+    answer = desk.session.fail(3)
+    assert not answer.success
+    assert answer.message.startswith("the disk is full. Now put the robot back")
+    desk.disk.full = False
+    desk.session.act(4, "action", "turn")
+    assert desk.actions()[1] == (FAILED, ["turn"], "")
+
+
+def test_what_a_gap_parts_has_one_origin() -> None:
+    desk = desk_with_state()
+    desk.session.fail(2)
+    desk.session.act(3, "action", "go")
+    desk.disk.full = True
+    desk.session.act(4, "action", "turn")
+    desk.disk.full = False
+    desk.session.act(5, "action", "stop")
+    assert [file.origin for file in desk.disk.files] == [FAILED, FAILED]
+    desk.disk.full = True
+    desk.session.sync(6)
+    desk.disk.full = False
+    desk.session.act(7, "action", "go")
+    assert [file.origin for file in desk.disk.files] == [FAILED, FAILED, FAILED]
+
+
+def test_what_is_held_when_it_failed_is_not_sampled_while_the_robot_is_put_back() -> None:
+    desk = desk_with_state(10.0)
+    desk.session.act(0, "action", "stop")
+    hold(desk, 1, 4)
+    desk.session.fail(4 * TENTH)
+    assert desk.actions() == [(DEMONSTRATION, ["stop"] * 4, "closed")]
+    hold(desk, 5, 20)
+    assert len(desk.disk.files) == 1
+    desk.session.act(20 * TENTH, "action", "")
+    desk.session.act(21 * TENTH, "action", "go")
+    hold(desk, 21, 25, 2.0)
+    assert desk.rows()[1] == [("go", None, (2.0,))] * 3
+
+
+def test_an_executor_that_drives_is_not_sampled_before_a_person_shows_what_failed() -> None:
+    desk = desk_with_state(10.0)
+    desk.session.act(0, "action", "go")
+    desk.session.command(5 * TENTH, "action", "turn")
+    rows = desk.session.rows
+    desk.session.fail(6 * TENTH)
+    for number in range(7, 30):
+        desk.session.command(number * TENTH, "action", "turn")
+        hold(desk, number, number + 1)
+    assert desk.session.rows == rows
+    desk.session.act(30 * TENTH, "action", "go")
+    # Under way: the person has the robot.
+    desk.session.command(31 * TENTH, "action", "turn")
+    hold(desk, 31, 34)
+    assert desk.actions()[1] == (FAILED, ["go"] * 3, "")
+
+
+def test_a_takeover_holds_all_until_its_end_while_the_person_only_holds_an_action() -> None:
+    desk = desk_with_state(10.0)
+    desk.session.drive(2, True)
+    desk.session.command(9 * TENTH, "action", "turn")
+    desk.session.act(10 * TENTH, "action", "go")
+    desk.session.drive(10 * TENTH + 1, False)
+    hold(desk, 11, 60)
+    desk.session.act(60 * TENTH, "action", "")
+    hold(desk, 61, 80)
+    desk.session.act(80 * TENTH, "action", "stop")
+    hold(desk, 81, 85)
+    # Also what is due since the last state: nothing tells it from what was before.
+    desk.session.renew(86 * TENTH)
+    assert desk.actions() == [(TAKEOVER, ["go"] * 50 + ["stop"] * 6, "closed")]
+    assert desk.rows()[0][0] == ("go", "turn", (1.0,))
+    assert desk.session.takeovers == 1
+
+
+@pytest.mark.parametrize("end", ["renew", "stop", "fail", "hand over"])
+def test_a_demonstration_ends_with_the_samples_that_were_due(end: str) -> None:
+    desk = desk_with_state(10.0)
+    desk.session.act(0, "action", "go")
+    if end == "hand over":
+        desk.session.drive(5 * TENTH, True)
+    else:
+        getattr(desk.session, end)(5 * TENTH)
+    assert desk.actions() == [(DEMONSTRATION, ["go"] * 5, "closed")]
+
+
+def test_a_second_takeover_of_an_episode_is_another_demonstration() -> None:
+    desk = desk_with_state()
+    desk.session.drive(2, True)
+    for start in (1, 5):
+        desk.session.act(start * SECOND, "action", "go")
+        # However slow the person is, as long as the executor rests.
+        desk.session.act((start + 3) * SECOND, "action", "stop")
+        desk.session.drive((start + 3) * SECOND + 1, True)
+    assert desk.actions() == [(TAKEOVER, ["go", "stop"], "closed")] * 2
+    assert desk.session.takeovers == 2

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from recording_examples import FEATURES, ROWS, assert_same
 
-from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.errors import InputError
 from rebt_ros.storage.recording import read_recording, recordings
 
@@ -33,6 +33,16 @@ def test_an_old_recording_reads_back_to_the_last_bit(tmp_path: Path) -> None:
     read = read_recording(written(tmp_path))
     assert read.notes == ()
     assert_same(read.demonstration, Demonstration.from_rows("", FEATURES, ROWS))
+
+
+@pytest.mark.parametrize(
+    ("rate", "kind"), [(b"null", RowKind.EVENT), (b"20.0", RowKind.SAMPLE), (b"5", RowKind.SAMPLE)]
+)
+def test_what_a_row_is_follows_from_the_sample_rate(
+    tmp_path: Path, rate: bytes, kind: RowKind
+) -> None:
+    text = TEXT.encode().replace(b'"sample_rate": null', b'"sample_rate": ' + rate)
+    assert read_recording(written(tmp_path, text)).demonstration.row_kind is kind
 
 
 def test_a_torn_last_line_is_left_out_with_a_note(tmp_path: Path) -> None:
@@ -75,6 +85,7 @@ def test_a_file_without_its_two_first_lines_is_passed_over(tmp_path: Path) -> No
         (b"\n17", b"\n\n17", "line 3: this is not a row"),
         (b"stamp,channel", b"stamps,channel", "line 2: the columns must be"),
         (b'"version": 1', b'"version": 3', "its version is 3, not 1 or 2: use the version"),
+        (b'"sample_rate": null', b'"sample_rate": -1', "its sample rate is -1, not null"),
         (b'"features": [', b'"features": 7, "x": [', "lists no features"),
         (b'"name": "front"', b'"name": 7', "is not a feature"),
         (b'"index": 0', b'"index": null', "needs both a topic and an index"),

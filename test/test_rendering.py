@@ -26,8 +26,16 @@ from rebt_ros.behavior_tree.learned_tree import (
 )
 from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.logic.conditions import Interval, IsTrue, LastActionIs, Literal, Threshold
+from rebt_ros.logic.conditions import (
+    Difference,
+    Interval,
+    IsTrue,
+    Literal,
+    PreviousActionIs,
+    Threshold,
+)
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -35,15 +43,16 @@ SVG = "{http://www.w3.org/2000/svg}"
 def learned(tree: nodes.Node, *suggestions: Suggestion) -> LearnedTree:
     """A document around the tree that declares all it needs."""
     shown = [tree, *(suggestion.subtree for suggestion in suggestions)]
-    conditions = [one.literal.condition for each in shown for one in nodes.conditions(each)]
-    features = {one.feature for one in conditions if not isinstance(one, LastActionIs)}
+    features = frozenset().union(*map(nodes.features, shown))
     actions = [action for each in shown for action in nodes.actions(each)]
+    conditions = [one.literal.condition for each in shown for one in nodes.conditions(each)]
+    actions += [act(one.action) for one in conditions if isinstance(one, PreviousActionIs)]
     figures = Figures(0, 0.9, 0.95, 40)
     return LearnedTree(
         features=tuple(Feature(name) for name in sorted(features)),
         actions=tuple(dict.fromkeys(actions)),
         tree=tree,
-        provenance=Provenance(3, 160, 0.1, None, 0.0, Root.SELECTOR, True, figures),
+        provenance=Provenance(3, 160, 0.1, None, 0.0, Root.SELECTOR, History.LAST, figures),
         suggestions=suggestions,
     )
 
@@ -91,17 +100,22 @@ HOSTILE = [
     "池",
 ]
 labels = st.one_of(st.sampled_from(HOSTILE), st.text(max_size=8))
+quantities = st.one_of(
+    labels,
+    st.lists(labels, min_size=2, max_size=2, unique=True).map(lambda pair: Difference(*pair)),
+)
 leaves = st.one_of(
     labels.map(act),
     labels.map(holds),
+    labels.map(lambda label: nodes.Condition(Literal(PreviousActionIs(label)))),
     st.builds(
-        lambda name, value: nodes.Condition(Literal(Threshold(name, value))),
-        labels,
+        lambda quantity, value: nodes.Condition(Literal(Threshold(quantity, value))),
+        quantities,
         st.floats(-1e9, 1e9),
     ),
     st.builds(
-        lambda name, above: nodes.Condition(Literal(Interval(name, above, above + 1))),
-        labels,
+        lambda quantity, above: nodes.Condition(Literal(Interval(quantity, above, above + 1))),
+        quantities,
         st.floats(-1e9, 1e9),
     ),
 )

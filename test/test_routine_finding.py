@@ -17,6 +17,7 @@ from rebt_ros.behavior_tree import document, nodes
 from rebt_ros.behavior_tree.learned_tree import Suggestion, SuggestionKind
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.decision_tree.training import fit
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.edit_distance.bounds import min_distance
@@ -219,7 +220,7 @@ def offered(
     routines: Sequence[FoundRoutine], options: LearnOptions
 ) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
     table = demonstrated()
-    trained = fit(table, last_action=True, max_depth=5).at(0.0)
+    trained = fit(table, vocabulary=some.LAT, max_depth=5).at(0.0)
     return suggest(table, trained, 0.0, options, routines)
 
 
@@ -262,7 +263,7 @@ def learning() -> Learning:
         table,
         LearnOptions(
             psa=Use.NEVER,
-            last_action=Use.NEVER,
+            history=History.NONE,
             max_depth=3,
             ccp_alpha=0.0,
             attach=("sequence-1", "repeater-1"),

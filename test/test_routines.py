@@ -361,7 +361,7 @@ def shape(found: Guard) -> set[frozenset[tuple[object, bool]]]:
 
 
 def _asked(condition: Condition) -> object:
-    return condition.feature if isinstance(condition, Threshold) else condition
+    return condition.quantity if isinstance(condition, Threshold) else condition
 
 
 @pytest.mark.parametrize(
@@ -385,10 +385,10 @@ def test_the_conditions_that_decide_are_found(wanted: Guard, seed: int) -> None:
     found = guard(states, went_on, some.FEATURES, 0.6)
     # IsTrue is one of two values, so both ways to say it mean the same.
     assert shape(found) == shape(wanted)
-    asked = {one.condition.feature: one.condition for clause in wanted for one in clause}
+    asked = {_asked(one.condition): one.condition for clause in wanted for one in clause}
     for literal in (one for clause in found for one in clause):
         if isinstance(literal.condition, Threshold):
-            true = asked[literal.condition.feature]
+            true = asked[literal.condition.quantity]
             assert isinstance(true, Threshold)
             assert literal.condition.value == pytest.approx(true.value, abs=0.05)
 
@@ -439,7 +439,9 @@ def test_of_a_great_many_states_some_are_enough() -> None:
 
 asked = some.literals(
     st.one_of(
-        some.thresholds(),
+        # Of differences, guards know nothing.
+        some.thresholds("distance"),
+        some.thresholds("battery"),
         st.just(IsTrue("docked")),
         st.sampled_from(some.FEATURES[3].categories).map(lambda name: HasCategory("kind", name)),
     )

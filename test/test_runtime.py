@@ -13,6 +13,7 @@ import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import strategies as some
 from hypothesis import given, settings
@@ -21,8 +22,10 @@ from py_trees.common import Status
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
+from rebt_ros.behavior_tree.prediction import States, as_it_stands, choose
 from rebt_ros.behavior_tree.runtime import StateEncoder, SucceedAtOnce, TreeRuntime, executable
-from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.demonstration import RowKind
+from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import (
     HasCategory,
@@ -30,6 +33,7 @@ from rebt_ros.logic.conditions import (
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
     Threshold,
 )
 
@@ -41,6 +45,8 @@ LOW = some.at_most("battery", 0.2)
 DOCKED = Literal(IsTrue("docked"))
 CUP = Literal(HasCategory("kind", "cup"))
 BETWEEN = Literal(Interval("distance", 0.1, 0.3))
+AHEAD = some.at_most(some.DIFFERENCE, 0.0)
+APART = Literal(Interval(some.DIFFERENCE, 0.0, 0.5))
 
 #: Distance, battery, docked, kind.
 FAR_AWAY = (1.0, 1.0, 0.0, 0.0)
@@ -108,7 +114,22 @@ def run(
         (~DOCKED, (0, 0, math.nan, 0), "S"),
         (CUP, (0, 0, 0, math.nan), "F"),
         (~CUP, (0, 0, 0, math.nan), "S"),
+        # Distance minus battery.
+        (AHEAD, (0.75, 0.5, 0, 0), "F"),
+        (AHEAD, (0.5, 0.5, 0, 0), "S"),
+        (AHEAD, (0.25, 0.5, 0, 0), "S"),
+        (~AHEAD, (0.75, 0.5, 0, 0), "S"),
+        (APART, (0.5, 0.5, 0, 0), "F"),
+        (APART, (0.75, 0.5, 0, 0), "S"),
+        (APART, (1.0, 0.5, 0, 0), "S"),
+        (APART, (1.5, 0.5, 0, 0), "F"),
+        (AHEAD, (math.nan, 0.5, 0, 0), "F"),
+        (AHEAD, (0.5, math.nan, 0, 0), "F"),
+        (~AHEAD, (0.5, math.nan, 0, 0), "S"),
+        (~APART, (math.nan, math.nan, 0, 0), "S"),
         # Nothing was done before the first tick.
+        (Literal(PreviousActionIs("go")), (0, 0, 0, 0), "F"),
+        (~Literal(PreviousActionIs("go")), (0, 0, 0, 0), "S"),
         (Literal(LastActionIs("go")), (0, 0, 0, 0), "F"),
         (~Literal(LastActionIs("go")), (0, 0, 0, 0), "S"),
     ],
@@ -123,7 +144,7 @@ def test_a_condition_succeeds_where_its_literal_holds(
 
 
 @settings(max_examples=100)
-@given(some.literals(some.conditions(last_action=False)), some.states)
+@given(some.literals(some.conditions(history=False)), some.states)
 def test_a_condition_means_what_it_is_defined_to_mean(
     literal: Literal, state: tuple[float, ...]
 ) -> None:
@@ -427,6 +448,299 @@ def test_after_halting_a_memory_starts_afresh_but_lat_goes_on() -> None:
     assert runtime.histories[some.CHANNEL].before() == "turn"
 
 
+# --- the previous action ----------------------------------------------------------------------
+
+
+def doing(action: str) -> Literal:
+    return Literal(PreviousActionIs(action))
+
+
+#: By turns: turns after going, waits after turning, and goes otherwise.
+BY_TURNS = nodes.Selector(
+    (some.when(doing("go"), then=TURN), some.when(doing("turn"), then=WAIT), GO)
+)
+#: Turns where it is near, does nothing where it is docked, waits after going, goes otherwise.
+DISTURBED = nodes.Selector(
+    (
+        some.when(NEAR, then=TURN),
+        some.when(~DOCKED, doing("go"), then=WAIT),
+        some.when(~DOCKED, then=GO),
+    )
+)
+DOCK = (1.0, 1.0, 1.0, 0.0)
+
+PREVIOUS_TABLES = [
+    pytest.param(
+        # go   turn  wait   previous
+        # R    -     -      -
+        # halt R     -      go     a sample: what was commanded at the tick before
+        # -    halt  R      turn
+        # R    -     halt   wait
+        # halt F     -      go     turn fails, and going is the next rule
+        BY_TURNS,
+        RowKind.SAMPLE,
+        {"go": "R", "turn": "RF", "wait": "R"},
+        [FAR_AWAY] * 5,
+        ["go", "turn, halt go", "halt turn, wait", "halt wait, go", "turn, go"],
+        [None, "go", "turn", "wait", "go", "go"],
+        id="samples of running actions",
+    ),
+    pytest.param(
+        # go   turn  wait   previous
+        # R    -     -      -
+        # R    -     -      -      still under way: nothing has ended
+        # S    -     -      -
+        # -    R     -      go
+        # -    S     -      go
+        # -    -     S      turn
+        # S    -     -      wait
+        BY_TURNS,
+        RowKind.EVENT,
+        {"go": "RRS", "turn": "RS", "wait": "S"},
+        [FAR_AWAY] * 7,
+        ["go", "go", "go", "turn", "turn", "wait", "go"],
+        [None, None, None, "go", "go", "turn", "wait", "go"],
+        id="events that run and succeed",
+    ),
+    pytest.param(
+        # go   turn   previous
+        # F    -      -      it failed, and so has ended
+        # F    F      go     in the order in which they were ticked: going ended last
+        BY_TURNS,
+        RowKind.EVENT,
+        {"go": "F", "turn": "F"},
+        [FAR_AWAY] * 2,
+        ["go", "turn, go"],
+        [None, "go", "go"],
+        id="events that fail",
+    ),
+    pytest.param(
+        # state  go    turn   wait   previous
+        # far    R     -      -      -
+        # near   halt  R      -      -      going has ended, as turning takes its place
+        # far    -     halt   R      go     and so has turning
+        # far    R     -      halt   turn
+        DISTURBED,
+        RowKind.EVENT,
+        {"go": "R", "turn": "R", "wait": "R"},
+        [FAR_AWAY, NEARBY, FAR_AWAY, FAR_AWAY],
+        ["go", "turn, halt go", "halt turn, wait", "halt wait, go"],
+        [None, None, "go", "turn", "wait"],
+        id="events that are interrupted by another action",
+    ),
+    pytest.param(
+        # state   go    wait   previous
+        # far     R     -      -
+        # docked  halt  -      -     interrupted, and nothing takes its place
+        # docked  -     -      go
+        # far     -     S      go
+        DISTURBED,
+        RowKind.EVENT,
+        {"go": "R"},
+        [FAR_AWAY, DOCK, DOCK, FAR_AWAY],
+        ["go", "halt go", "", "wait"],
+        [None, None, "go", "go", "wait"],
+        id="events that are interrupted by nothing",
+    ),
+    pytest.param(
+        # state   go    wait   previous
+        # far     R     -      -
+        # docked  halt  -      go    a tick without a command leaves it as it is
+        # docked  -     -      go
+        # far     -     S      go
+        DISTURBED,
+        RowKind.SAMPLE,
+        {"go": "R"},
+        [FAR_AWAY, DOCK, DOCK, FAR_AWAY],
+        ["go", "halt go", "", "wait"],
+        [None, "go", "go", "go", "wait"],
+        id="samples without a command",
+    ),
+    pytest.param(
+        # go   turn   previous
+        # S    R      -
+        # -    R      go    a Sequence with memory: going has ended, turning has not
+        # -    S      go
+        nodes.Sequence((GO, TURN), memory=True),
+        RowKind.EVENT,
+        {"turn": "RRS"},
+        [FAR_AWAY] * 3,
+        ["go, turn", "turn", "turn"],
+        [None, "go", "go", "turn"],
+        id="events one after the other",
+    ),
+    pytest.param(
+        # go   turn   previous
+        # S    R      -
+        # -    R      turn
+        nodes.Sequence((GO, TURN), memory=True),
+        RowKind.SAMPLE,
+        {"turn": "RRS"},
+        [FAR_AWAY] * 2,
+        ["go, turn", "turn"],
+        [None, "turn", "turn"],
+        id="samples one after the other",
+    ),
+]
+
+
+@pytest.mark.parametrize(("tree", "kind", "script", "states", "log", "previous"), PREVIOUS_TABLES)
+def test_tick_table_of_the_previous_action(
+    tree: nodes.Node,
+    kind: RowKind,
+    script: dict[str, str],
+    states: list[tuple[float, ...]],
+    log: list[str],
+    previous: list[str | None],
+) -> None:
+    commander = Scripted(**script)
+    runtime = TreeRuntime(some.learned(tree, row_kind=kind), commander)
+    history = runtime.histories[some.CHANNEL]
+    seen, told = [history.previous], []
+    for state in states:
+        commander.log.clear()
+        runtime.tick(state)
+        told.append(", ".join(commander.log))
+        seen.append(history.previous)
+    assert told == log
+    assert seen == previous
+
+
+@pytest.mark.parametrize(("kind", "previous"), [(RowKind.EVENT, "turn"), (RowKind.SAMPLE, "turn")])
+def test_what_runs_has_ended_once_the_tree_is_halted(kind: RowKind, previous: str) -> None:
+    runtime = TreeRuntime(some.learned(BY_TURNS, row_kind=kind), Scripted(turn="R"))
+    for _ in range(2):
+        runtime.tick(FAR_AWAY)
+    runtime.halt()
+    history = runtime.histories[some.CHANNEL]
+    assert history.previous == previous
+    assert runtime.tick(FAR_AWAY).actions == (WAIT,)
+    # It is not counted a second time.
+    assert history.previous == "wait"
+
+
+def test_halting_what_does_not_run_leaves_the_previous_action() -> None:
+    for kind in RowKind:
+        runtime = TreeRuntime(some.learned(BY_TURNS, row_kind=kind))
+        runtime.halt()
+        assert runtime.histories[some.CHANNEL].previous is None
+        runtime.tick(FAR_AWAY)
+        runtime.halt()
+        assert runtime.histories[some.CHANNEL].previous == "go"
+
+
+@pytest.mark.parametrize("kind", RowKind)
+def test_what_a_person_did_is_the_previous_action(kind: RowKind) -> None:
+    runtime = TreeRuntime(some.learned(BY_TURNS, row_kind=kind), Scripted(go="R"))
+    history = runtime.histories[some.CHANNEL]
+    runtime.tick(FAR_AWAY)
+    # As in a takeover: the tree is halted, and the person's commands are noted.
+    runtime.halt()
+    for label in ("go", "turn"):
+        history.take(label)
+    assert runtime.tick(FAR_AWAY).actions == (WAIT,)
+    # Where everything is forgotten, the tree begins as in a demonstration's first row.
+    runtime.halt()
+    history.clear()
+    assert runtime.tick(FAR_AWAY).actions == (GO,)
+
+
+def test_what_a_robot_is_sent_to_stop_it_is_not_the_previous_action() -> None:
+    runtime = TreeRuntime(some.learned(BY_TURNS))
+    runtime.tick(FAR_AWAY)
+    runtime.histories[some.CHANNEL].begin("turn")
+    assert runtime.histories[some.CHANNEL].before() == "turn"
+    assert runtime.tick(FAR_AWAY).actions == (TURN,)
+
+
+@pytest.mark.parametrize("kind", RowKind)
+def test_a_tree_that_follows_another_goes_on_with_its_previous_action(kind: RowKind) -> None:
+    first = TreeRuntime(some.learned(GO, row_kind=kind), Scripted(go="R"))
+    first.tick(FAR_AWAY)
+    first.halt()
+    second = TreeRuntime(some.learned(BY_TURNS, row_kind=kind), histories=first.histories)
+    assert second.tick(FAR_AWAY).actions == (TURN,)
+    # The histories are shared, not copied.
+    assert first.histories[some.CHANNEL].previous == "turn"
+
+
+WAVE, REST = nodes.Action("wave", "arm"), nodes.Action("rest", "arm")
+
+
+@pytest.mark.parametrize(
+    ("kind", "chosen"),
+    [
+        # The arm's actions are done at once; going runs, and so is no previous action of events.
+        (RowKind.EVENT, [("go", "rest"), ("go", "wave"), ("go", "rest"), ("go", "wave")]),
+        (RowKind.SAMPLE, [("go", "rest"), ("turn", "wave"), ("wait", "rest"), ("go", "wave")]),
+    ],
+)
+def test_each_channel_has_a_previous_action_of_its_own(
+    kind: RowKind, chosen: list[tuple[str, str]]
+) -> None:
+    arm = nodes.Selector((some.when(doing("rest"), then=WAVE), REST))
+    learned = some.learned(nodes.Parallel((BY_TURNS, arm)), row_kind=kind)
+    runtime = TreeRuntime(learned, Scripted(go="R", turn="R", wait="R"))
+    ticked = [
+        tuple(action.label for action in runtime.tick(FAR_AWAY).actions) for _ in range(len(chosen))
+    ]
+    assert ticked == chosen
+
+
+def test_what_was_interrupted_on_one_channel_says_nothing_of_the_other_one() -> None:
+    drive = nodes.Selector((some.when(NEAR, then=TURN), some.when(~DOCKED, then=GO)))
+    arm = nodes.Selector((WAVE,))
+    learned = some.learned(nodes.Parallel((drive, arm)))
+    runtime = TreeRuntime(learned, Scripted(go="R", wave="R"))
+    for state in (FAR_AWAY, DOCK):
+        runtime.tick(state)
+    histories = runtime.histories
+    assert histories[some.CHANNEL].previous == "go"
+    assert histories["arm"].previous is None
+    runtime.halt()
+    assert histories["arm"].previous == "wave"
+
+
+def test_all_conditions_of_a_tick_see_the_same_previous_action() -> None:
+    tree = nodes.Sequence((GO, nodes.Condition(doing("go"))))
+    for kind in RowKind:
+        runtime = TreeRuntime(some.learned(tree, row_kind=kind))
+        assert runtime.tick(FAR_AWAY).status is Status.FAILURE
+        assert runtime.tick(FAR_AWAY).status is Status.SUCCESS
+
+
+@settings(max_examples=150)
+@given(
+    some.rule_trees(),
+    st.lists(st.tuples(some.states, st.sampled_from("RS")), min_size=1, max_size=12),
+    st.sampled_from(RowKind),
+)
+def test_each_tick_takes_what_prediction_says_after_the_ticks_before(
+    tree: nodes.Node, script: list[tuple[tuple[float, ...], str]], kind: RowKind
+) -> None:
+    learned = some.learned(tree, row_kind=kind)
+    commander = Scripted()
+    runtime = TreeRuntime(learned, commander)
+    history = runtime.histories[some.CHANNEL]
+    previous: str | None = None
+    running: str | None = None
+    for state, answer in script:
+        commander.script = dict.fromkeys(some.LABELS, answer)
+        assert history.previous == previous
+        states = States(some.FEATURES, np.array([state]), as_it_stands(history))
+        (code,) = choose(tree, some.ACTIONS, states).tolist()
+        chosen = () if code == NO_ACTION else (some.ACTIONS[code],)
+        assert runtime.tick(state).actions == chosen
+        label = None if code == NO_ACTION else some.LABELS[code]
+        if kind is RowKind.SAMPLE:
+            previous = previous if label is None else label
+            continue
+        if running not in (None, label):
+            previous = running
+        running = label if answer == "R" else None
+        previous = label if answer == "S" and label else previous
+
+
 # --- LAT --------------------------------------------------------------------------------------
 
 
@@ -591,11 +905,16 @@ def test_an_executable_form_can_be_run_instead_of_the_tree() -> None:
 
 
 @settings(max_examples=60)
-@given(some.trees(), st.lists(some.states, min_size=1, max_size=6), st.text("RSF", min_size=1))
+@given(
+    some.trees(),
+    st.lists(some.states, min_size=1, max_size=6),
+    st.text("RSF", min_size=1),
+    st.sampled_from(RowKind),
+)
 def test_the_tree_of_a_document_runs_like_the_tree_itself(
-    tree: nodes.Node, states: list[tuple[float, ...]], answers: str
+    tree: nodes.Node, states: list[tuple[float, ...]], answers: str, kind: RowKind
 ) -> None:
-    learned = some.learned(tree)
+    learned = some.learned(tree, row_kind=kind)
     script = {label: answers[place:] or answers for place, label in enumerate(some.LABELS)}
     one = TreeRuntime(learned, Scripted(**script))
     two = TreeRuntime(loads(dumps(learned)), Scripted(**script))

@@ -16,6 +16,7 @@ from rebt_ros import offline
 from rebt_ros.commands.simulate import main
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.fields import dimension_labels_of, fields_of
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.options import LearnOptions, Use
 from rebt_ros.simulation.experiment_config import (
@@ -159,7 +160,7 @@ def test_outcome_and_clock_are_in_the_table_but_are_no_features(
 def test_learn_reads_the_table_as_it_is(tmp_path: Path) -> None:
     tree = Group(SEQUENCE, (Group(SELECTOR, (Y, Inverted(Check("/x", 0.6)))), Act("a"), Act("b")))
     run(write(tmp_path, tree), "--ticks", "300", "--out", tmp_path / "out")
-    options = LearnOptions(last_action=Use.NEVER, psa=Use.NEVER, max_depth=3, ccp_alpha=0.0)
+    options = LearnOptions(history=History.NONE, psa=Use.NEVER, max_depth=3, ccp_alpha=0.0)
     learned = offline.learn([tmp_path / "out" / "table.csv"], options=options).learned
     assert [feature.name for feature in learned.features] == ["/x", "/y"]
     assert sorted(action.label for action in learned.actions) == ["a", "b"]

@@ -14,6 +14,7 @@ from ros_processes import NodeProcess, Peer, values_of
 from std_msgs.msg import Bool, Float64MultiArray, String
 
 from rebt_ros import offline
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.options import LearnOptions, Use
 from rebt_ros.simulation.experiment_config import (
     Act,
@@ -101,7 +102,7 @@ def test_what_the_recorder_records_is_what_the_simulation_logs(
     assert len(expected.demonstration) > 150
     assert [feature.name for feature in recorded.features] == ["/x", "/y"]
     assert rows(recorded) == rows(expected.demonstration)
-    options = LearnOptions(last_action=Use.NEVER, psa=Use.NEVER, max_depth=3, ccp_alpha=0.0)
+    options = LearnOptions(history=History.NONE, psa=Use.NEVER, max_depth=3, ccp_alpha=0.0)
     learned = offline.learn([directory / "demonstrations"], options=options).learned
     assert [(one.name, one.topic) for one in learned.features] == [("/x", "state"), ("/y", "state")]
 

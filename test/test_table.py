@@ -12,10 +12,10 @@ import strategies as some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rebt_ros.demonstration.demonstration import Demonstration, Row
+from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.last_action import NO_ACTION
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.demonstration.table import DemonstrationTable, part_of, tabulate
 from rebt_ros.errors import InputError, OptionError, RebtError
 
 NUMERIC, BINARY, CATEGORICAL = FeatureKind
@@ -249,6 +249,72 @@ def test_a_part_of_a_table_derives_lat_anew(table: DemonstrationTable, data: st.
     assert part.last.tolist() == again.last.tolist()
 
 
+@settings(max_examples=60)
+@given(some.tables(), st.data())
+def test_a_part_of_a_table_keeps_the_previous_action_of_each_row(
+    table: DemonstrationTable, data: st.DataObject
+) -> None:
+    size = len(table)
+    kept = np.array(data.draw(st.lists(st.booleans(), min_size=size, max_size=size)), dtype=bool)
+    part = table.where(kept)
+    assert part.previous.tolist() == table.previous[kept].tolist()
+    # And so does a part of the part.
+    again = part.where(np.arange(len(part)) % 2 == 1)
+    assert again.previous.tolist() == part.previous[1::2].tolist()
+
+
+def test_the_previous_action_is_the_channels_own_and_starts_anew_in_every_demonstration() -> None:
+    one = shown("one", [(n,) for n in range(5)], "gxthg", channels="mamam")
+    two = shown("two", [(n,) for n in range(3)], "ttg", channels="mmm")
+    arm, move = tabulate([one, two])
+    assert (arm.actions, move.actions) == (("h", "x"), ("g", "t"))
+    assert arm.previous.tolist() == [NO_ACTION, 1]
+    assert move.previous.tolist() == [NO_ACTION, 0, 1, NO_ACTION, 1, 1]
+
+
+def test_what_rows_are_goes_from_demonstrations_to_tables() -> None:
+    events = [shown(name, [(1,)] * 2, "gt", channels="ma") for name in ("one", "two")]
+    assert {table.row_kind for table in tabulate(events)} == {RowKind.EVENT}
+    samples = [replace(one, row_kind=RowKind.SAMPLE) for one in events]
+    for table in tabulate(samples):
+        assert table.row_kind is RowKind.SAMPLE
+        assert table.where(np.array([True, False])).row_kind is RowKind.SAMPLE
+
+
+def test_demonstrations_whose_rows_mean_different_things_are_refused() -> None:
+    events = shown("one", [(1,)] * 2, "gt")
+    samples = replace(shown("two", [(1,)] * 2, "gt"), row_kind=RowKind.SAMPLE)
+    with pytest.raises(InputError) as refused:
+        tabulate([events, samples])
+    assert str(refused.value) == (
+        "the rows of one are events and those of two are samples, so that what was done before a "
+        "row means different things: record all with the same sample_rate, or none."
+    )
+    # One without rows says nothing.
+    empty = replace(shown("none", [], ""), features=samples.features, states=np.empty((0, 1)))
+    assert tabulate([empty, samples])[0].row_kind is RowKind.SAMPLE
+
+
+@pytest.mark.parametrize(
+    ("demonstrations", "rows", "kept"),
+    [
+        # The first rows of the only one; whole demonstrations, evenly spread, and at least two.
+        ([0] * 10, 4, [0, 1, 2, 3]),
+        ([0] * 10, 10, list(range(10))),
+        ([0, 0, 1, 1, 2, 2, 3, 3], 4, [0, 1, 4, 5]),
+        ([0, 0, 1, 1, 2, 2, 3, 3], 1, [0, 1, 4, 5]),
+        ([0, 0, 1, 1], 100, [0, 1, 2, 3]),
+    ],
+)
+def test_a_part_that_tells_is_made_of_whole_demonstrations(
+    demonstrations: list[int], rows: int, kept: list[int]
+) -> None:
+    table = some.table(
+        [(0.0,) * 4] * len(demonstrations), [0] * len(demonstrations), demonstrations
+    )
+    assert part_of(table, rows).stamps.tolist() == kept
+
+
 @pytest.mark.parametrize(
     ("rows", "fraction", "held_out"),
     [
@@ -278,6 +344,13 @@ def test_the_last_rows_of_a_single_demonstration_are_held_out(
     ("demonstration", "fraction", "held_out"),
     [
         ([0, 0, 0, 1], 0.25, {1}),
+        # As nearly the share of the rows as whole demonstrations allow: here 1 of 10, not 7.
+        ([0, 0, 0, 1, 1, 1, 1, 1, 1, 2], 0.25, {2}),
+        ([0] * 5 + [1] * 2 + [2], 0.25, {2}),
+        ([0] * 5 + [1] * 2 + [2], 0.3, {1, 2}),
+        ([0, 1, 2, 3, 4], 0.25, {4}),
+        # Of two that come as close, the fewer rows.
+        ([0, 1, 2, 3, 4], 0.5, {3, 4}),
         ([0, 1, 2, 3], 0.25, {3}),
         ([0, 1, 2, 3], 0.5, {2, 3}),
         ([0, 1, 2, 3], 0.9, {1, 2, 3}),
@@ -304,7 +377,12 @@ def test_held_out_rows_are_the_last_ones_and_never_all(
     held_out = table.held_out(fraction)
     assert 0 < held_out.sum() < len(table)
     assert (np.sort(held_out) == held_out).all()
-    if len(set(table.demonstration)) > 1:
+    shown = sorted(set(table.demonstration.tolist()))
+    if len(shown) > 1:
+        # No other number of last demonstrations comes closer to the share.
+        sizes = [int((table.demonstration >= first).sum()) for first in shown[1:]]
+        off = [abs(size - fraction * len(table)) for size in sizes]
+        assert abs(held_out.sum() - fraction * len(table)) <= min(off) + 1e-9
         apart = set(table.demonstration[held_out]) & set(table.demonstration[~held_out])
         assert not apart
 

@@ -93,6 +93,17 @@ def test_an_executor_that_holds_the_robot_drives_without_commands() -> None:
     assert watch.act(3 * SECOND, "action", "go") is None
 
 
+def test_what_a_person_was_asked_to_show_is_no_takeover() -> None:
+    watch = TakeoverWatch(["action"])
+    watch.command(0, "action", "go")
+    assert watch.driven
+    assert watch.act(SECOND, "action", "stop", awaited=True) is None
+    assert (watch.driven, watch.takeovers) == (False, 0)
+    watch.command(2 * SECOND, "action", "go")
+    assert watch.act(3 * SECOND, "action", "turn") == {"action": ("stop", "go")}
+    assert watch.takeovers == 1
+
+
 FAMILIAR, STRANGE = {"state": (7.0, 0.5)}, {"state": (7.0, 3.0)}
 LEARNED = replace(
     some.learned(some.action("go"), [Feature("y"), Feature("x")]),

@@ -7,6 +7,7 @@ import pytest
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
 from rebt_ros.behavior_tree.nodes import Action, Condition, Selector, Sequence
 from rebt_ros.demonstration.builder import BadMessageError, Fault
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import HasCategory, LastActionIs, Literal, Threshold
 from rebt_ros.ros.tree_inputs import Message, TreeInputs
@@ -23,7 +24,9 @@ FEATURES = (
 def _inputs(features: tuple[Feature, ...] = FEATURES) -> TreeInputs:
     tests = (Threshold("x", 0.5), HasCategory("room", "4"), LastActionIs("go", ("turn",)))
     tree = Selector((Sequence((*(Condition(Literal(one)) for one in tests), TURN)), GO))
-    provenance = Provenance(1, 9, 0.0, 5, 0.0, Root.SELECTOR, True, Figures(0, None, None, 0))
+    provenance = Provenance(
+        1, 9, 0.0, 5, 0.0, Root.SELECTOR, History.LAST, Figures(0, None, None, 0)
+    )
     return TreeInputs(LearnedTree(features, (GO, TURN), tree, provenance), "table", timeout=100)
 
 
@@ -84,7 +87,9 @@ def test_freshness_ends_with_the_timeout_and_with_a_clock_set_back() -> None:
 def test_a_tree_that_tests_a_lagged_feature_reads_its_source_and_looks_back_until_reset() -> None:
     features = (Feature("other"), Feature("x[t-1]", index=3, lag=1))
     tree = Selector((Sequence((Condition(Literal(Threshold("x[t-1]", 0.5))), TURN)), GO))
-    provenance = Provenance(1, 9, 0.0, 5, 0.0, Root.SELECTOR, False, Figures(0, None, None, 0))
+    provenance = Provenance(
+        1, 9, 0.0, 5, 0.0, Root.SELECTOR, History.NONE, Figures(0, None, None, 0)
+    )
     inputs = TreeInputs(LearnedTree(features, (GO, TURN), tree, provenance), "table", timeout=100)
     assert inputs.topics == ("table",)
     with pytest.raises(BadMessageError):

@@ -11,13 +11,14 @@ import pytest
 
 from rebt_ros import pipeline
 from rebt_ros.decision_tree import training
-from rebt_ros.decision_tree.encoding import MISSING, Indicator, columns, encode
+from rebt_ros.decision_tree.encoding import MISSING, Indicator, Number, Vocabulary, columns, encode
 from rebt_ros.decision_tree.training import fit, train
 from rebt_ros.decision_tree.upsampling import Upsampling, svm_smote
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
-from rebt_ros.logic.conditions import HasCategory, LastActionIs
+from rebt_ros.logic.conditions import Difference, HasCategory, LastActionIs, PreviousActionIs
 from rebt_ros.options import LearnOptions, Use
 
 ROOMS = ("hall", "kitchen", "lab")
@@ -63,10 +64,14 @@ def rare(rows: int = 400, seed: int = 0, missing: bool = False) -> Demonstration
     return table_of(states, ("go", "stop"), stops, demonstrations=5)
 
 
-def made_up(table: DemonstrationTable, last_action: bool = True, seed: int = 0):
+LAT = Vocabulary(History.LAST)
+PREVIOUS_AND_DIFFERENCE = Vocabulary(History.PREVIOUS, (Difference("x", "y"),))
+
+
+def made_up(table: DemonstrationTable, vocabulary: Vocabulary = LAT, seed: int = 0):
     """The rows that were added to the encoded table, and their actions."""
-    matrix = encode(table, last_action)
-    more = svm_smote(matrix, table.chosen, columns(table, last_action), seed)
+    matrix = encode(table, vocabulary)
+    more = svm_smote(matrix, table.chosen, columns(table, vocabulary), seed)
     shown = len(table)
     assert more.matrix.dtype == np.float32
     np.testing.assert_array_equal(more.matrix[:shown], matrix)
@@ -83,7 +88,7 @@ class TestWithImbalancedLearn:
         table = rare()
 
         def stops_found(upsample: Upsampling) -> float:
-            trained = train(table, last_action=False, max_depth=2, upsample=upsample)
+            trained = train(table, max_depth=2, upsample=upsample)
             return float(np.mean(trained.predict(table)[table.chosen == 1] == 1))
 
         assert stops_found(Upsampling.NONE) < 0.2
@@ -100,13 +105,14 @@ class TestWithImbalancedLearn:
         assert 150 < len(rows) <= 360
 
     @pytest.mark.parametrize("missing", [False, True])
-    def test_indicators_stay_whole(self, missing: bool) -> None:
+    @pytest.mark.parametrize("vocabulary", [LAT, PREVIOUS_AND_DIFFERENCE])
+    def test_indicators_stay_whole(self, missing: bool, vocabulary: Vocabulary) -> None:
         table = rare(missing=missing)
-        asked = columns(table, last_action=True)
-        rows, _, _ = made_up(table)
+        asked = columns(table, vocabulary)
+        rows, _, _ = made_up(table, vocabulary)
         indicators = [place for place, one in enumerate(asked) if isinstance(one, Indicator)]
         assert set(np.unique(rows[:, indicators]).tolist()) == {0.0, 1.0}
-        for kind in (HasCategory, LastActionIs):
+        for kind in (HasCategory, LastActionIs, PreviousActionIs):
             group = [
                 place
                 for place, one in enumerate(asked)
@@ -117,8 +123,9 @@ class TestWithImbalancedLearn:
             rooms = [place for place, one in enumerate(asked) if "HasCategory" in str(one)]
             assert (rows[:, rooms].sum(axis=1) == 1).all()
         # LAT differs from the row's own action, and so it does in rows that are made up.
-        own = asked.index(Indicator(LastActionIs("stop")))
-        assert (rows[:, own] == 0).all()
+        if vocabulary is LAT:
+            own = asked.index(Indicator(LastActionIs("stop")))
+            assert (rows[:, own] == 0).all()
 
     def test_numbers_lie_within_what_was_shown_and_are_never_near_missing(self) -> None:
         table = rare(missing=True)
@@ -126,6 +133,16 @@ class TestWithImbalancedLearn:
         for place in (0, 1):
             assert rows[:, place].min() >= np.float32(np.nanmin(table.states[:, place]))
             assert rows[:, place].max() <= np.float32(np.nanmax(table.states[:, place]))
+
+    def test_differences_that_are_made_up_lie_within_those_shown(self) -> None:
+        table = rare(missing=True)
+        rows, _, _ = made_up(table, PREVIOUS_AND_DIFFERENCE)
+        place = columns(table, PREVIOUS_AND_DIFFERENCE).index(Number(Difference("x", "y")))
+        shown = table.states[:, 0] - table.states[:, 1]
+        known = rows[:, place][rows[:, place] < MISSING / 3]
+        assert len(known)
+        assert known.min() >= np.float32(np.nanmin(shown))
+        assert known.max() <= np.float32(np.nanmax(shown))
 
     def test_a_number_that_no_row_has_stays_missing(self) -> None:
         table = rare()
@@ -153,7 +170,7 @@ class TestWithImbalancedLearn:
         np.testing.assert_array_equal(first, again)
         assert not np.array_equal(first, other)
         trees = [
-            fit(table, last_action=True, random_state=3, upsample=Upsampling.SVM_SMOTE).at(0.0)
+            fit(table, vocabulary=LAT, random_state=3, upsample=Upsampling.SVM_SMOTE).at(0.0)
             for _ in range(2)
         ]
         assert trees[0].tree == trees[1].tree
@@ -175,7 +192,7 @@ class TestWithImbalancedLearn:
         assert (2 in added) is not (2 in left)
         if count == 1:
             assert left == (2,)
-            [_, note] = fit(table, last_action=False, upsample=Upsampling.SVM_SMOTE).notes
+            [_, note] = fit(table, upsample=Upsampling.SVM_SMOTE).notes
             assert note == "too few rows resemble each other to upsample 'wave'"
 
     def test_an_action_whose_rows_all_lack_a_number_is_named(self) -> None:
@@ -189,9 +206,9 @@ class TestWithImbalancedLearn:
         for rows in (2, 3, 5):
             states = np.zeros((rows, 4))
             table = table_of(states, ("a", "b"), np.arange(rows) == 0)
-            train(table, last_action=True, upsample=Upsampling.SVM_SMOTE)
+            train(table, vocabulary=LAT, upsample=Upsampling.SVM_SMOTE)
         table = replace(table, features=(), states=np.empty((5, 0)))
-        train(table, last_action=False, upsample=Upsampling.SVM_SMOTE)
+        train(table, upsample=Upsampling.SVM_SMOTE)
 
     def test_what_is_judged_is_real(self, monkeypatch: pytest.MonkeyPatch) -> None:
         table = rare()
@@ -203,32 +220,36 @@ class TestWithImbalancedLearn:
             return plain(matrix, chosen, asked, random_state)
 
         monkeypatch.setattr(training, "svm_smote", watched)
-        options = LearnOptions(last_action=Use.NEVER, upsample=Upsampling.SVM_SMOTE)
+        options = LearnOptions(
+            history=History.NONE,
+            differences=Use.NEVER,
+            refit=False,
+            upsample=Upsampling.SVM_SMOTE,
+        )
         learning = pipeline.learn_from(table, options)
         shown = table.where(~learning.held_out)
         # Rows that are held out, and each fold's own rows, are neither sources nor made up.
-        assert len(shown) == 240
-        assert fitted_to[0] == 240
-        assert sorted(fitted_to[1:4]) == [160, 160, 160]
+        assert len(shown) == 320
+        assert fitted_to[0] == 320
+        assert fitted_to[1:5] == [240] * 4
         provenance = learning.learned.provenance
-        assert provenance.rows == 400
-        assert provenance.figures.held_out_rows == 160
+        assert provenance.rows == 320
+        assert provenance.figures.held_out_rows == 80
         assert provenance.figures.fidelity_mismatches == 0
         held_out = table.where(learning.held_out)
         agreement = np.mean(learning.decision_tree.predict(held_out) == held_out.chosen)
         assert provenance.figures.teacher_forced_agreement == pytest.approx(agreement)
         assert learning.notes[0].startswith("the decision tree was fitted to")
-        assert learning.notes[0].endswith("made-up rows beside the 240 shown")
+        assert learning.notes[0].endswith("made-up rows beside the 320 shown")
         # The leaves do count the rows that were made up.
         counted = sum(sum(leaf.distribution) for _, leaf in learning.decision_tree.tree.paths())
-        assert counted > 300
+        assert counted > 400
 
     def test_refitting_upsamples_all_rows(self) -> None:
-        options = LearnOptions(
-            last_action=Use.NEVER, ccp_alpha=0.0, refit=True, upsample=Upsampling.SVM_SMOTE
-        )
+        options = LearnOptions(history=History.NONE, ccp_alpha=0.0, upsample=Upsampling.SVM_SMOTE)
         learning = pipeline.learn_from(rare(), options)
         assert learning.notes[0].endswith("made-up rows beside the 400 shown")
+        assert learning.learned.provenance.rows == 400
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,13 @@ from rebt_ros.behavior_tree.wording import Wording, distinct_texts
 from rebt_ros.logic.conditions import (
     KNOWN,
     Condition,
+    Difference,
     HasCategory,
     Interval,
     IsTrue,
     LastActionIs,
     Literal,
+    PreviousActionIs,
     Threshold,
 )
 
@@ -47,6 +49,19 @@ TRICKY = [
     "a b",
     "last action",
     "last action = a",
+    "doing",
+    "doing a",
+    "Doing  a",
+    "not doing a",
+    "a − b",
+    "b − a",
+    "a −",
+    "− b",
+    "−",
+    "a − b − c",
+    "b − c",
+    "a ≤ b",
+    "0.3 < a − b ≤ 0.5",
     "LAST ACTION",
     "a is known",
     "a is missing",
@@ -76,17 +91,26 @@ numbers = st.one_of(
     st.integers(-(10**9), 10**9).map(lambda whole: whole / 1000),
     st.floats(allow_nan=False, allow_infinity=False),
 )
+differences = st.lists(names, min_size=2, max_size=2, unique=True).map(
+    lambda pair: Difference(*pair)
+)
+quantities = st.one_of(names, differences)
 conditions: st.SearchStrategy[Condition] = st.one_of(
-    st.builds(Threshold, names, numbers),
+    st.builds(Threshold, quantities, numbers),
     st.builds(
-        lambda name, ends: Interval(name, *sorted(ends)),
-        names,
+        lambda quantity, ends: Interval(quantity, *sorted(ends)),
+        quantities,
         st.lists(numbers, min_size=2, max_size=2, unique=True),
     ),
+    st.builds(PreviousActionIs, names),
     st.builds(IsTrue, names),
     st.builds(HasCategory, names, names),
     st.builds(LastActionIs, names, st.lists(names, max_size=3).map(tuple)),
 )
+
+
+#: Of two sensors.
+APART = Difference("left", "right")
 
 
 def wording_of(*shown: Condition) -> Wording:
@@ -115,6 +139,13 @@ def text(condition: Condition, *others: Condition, positive: bool = True) -> str
         (HasCategory("kind", "box"), "kind = box", "kind ≠ box"),
         (HasCategory("kind", "2"), "kind = 2", None),
         (LastActionIs("turn", ("go",)), "last action = turn", "last action ≠ turn"),
+        (PreviousActionIs("go"), "doing go", "not doing go"),
+        (PreviousActionIs("turn left"), "doing turn left", None),
+        (Threshold(APART, 0.0), "left ≤ right", "left > right"),
+        (Threshold(APART, -0.0), "left ≤ right", "left > right"),
+        (Threshold(APART, 0.30000001192092896), "left − right ≤ 0.3", "left − right > 0.3"),
+        (Threshold(APART, KNOWN), "left − right is known", "left − right is missing"),
+        (Interval(APART, 0.0, 0.5), "0 < left − right ≤ 0.5", "not (0 < left − right ≤ 0.5)"),
     ],
 )
 def test_a_condition_reads_as_a_person_writes_it(
@@ -138,6 +169,13 @@ def test_a_condition_reads_as_a_person_writes_it(
         (Threshold("12", 0.5), "'12' ≤ 0.5"),
         (Interval("12", 0.3, 0.5), "0.3 < '12' ≤ 0.5"),
         (IsTrue("0.3 < x ≤ 0.5"), "'0.3 < x ≤ 0.5'"),
+        (IsTrue("doing go"), "'doing go'"),
+        (IsTrue("doing_go"), "doing_go"),
+        (PreviousActionIs("not go"), "doing 'not go'"),
+        (PreviousActionIs(""), "doing ''"),
+        (Threshold("left − right", 0.5), "'left − right' ≤ 0.5"),
+        (Threshold(Difference("left − right", "x"), 0.5), "'left − right' − x ≤ 0.5"),
+        (Threshold(Difference("x", "0.5"), 0.0), "x ≤ '0.5'"),
     ],
 )
 def test_a_name_that_can_be_misread_is_quoted(condition: Condition, expected: str) -> None:
@@ -165,6 +203,18 @@ def test_the_ends_of_intervals_share_their_digits_with_thresholds() -> None:
         "x ≤ 0.8375",
         "x ≤ 0.837",
         "y ≤ 0.837",
+    ]
+
+
+def test_a_difference_and_its_features_have_digits_of_their_own() -> None:
+    near, nearer = Threshold(APART, 0.83712), Threshold(APART, 0.83749)
+    left, other = Threshold("left", 0.83713), Threshold(Difference("right", "left"), 0.83714)
+    shown = wording_of(near, nearer, left, other)
+    assert [shown.literal(Literal(one)) for one in (near, nearer, left, other)] == [
+        "left − right ≤ 0.837",
+        "left − right ≤ 0.8375",
+        "left ≤ 0.837",
+        "right − left ≤ 0.837",
     ]
 
 
@@ -244,6 +294,25 @@ def test_an_explanation_has_every_digit_and_tells_of_missing_values() -> None:
     assert Wording(node).explanation(node) == (
         "Condition: 'battery' > 0.30000001192092896, or missing"
     )
+
+
+@pytest.mark.parametrize(
+    ("literal", "expected"),
+    [
+        (Literal(Threshold(APART, 0.0)), "'left' - 'right' <= 0.0"),
+        (
+            ~Literal(Threshold(APART, 0.1 + 0.2)),
+            "'left' - 'right' > 0.30000000000000004, or missing",
+        ),
+        (Literal(PreviousActionIs("go")), "the action before is 'go'"),
+        (~Literal(PreviousActionIs("go")), "the action before is not 'go'"),
+    ],
+)
+def test_an_explanation_tells_of_differences_and_of_what_was_done_before(
+    literal: Literal, expected: str
+) -> None:
+    node = nodes.Condition(literal)
+    assert Wording(node).explanation(node) == f"Condition: {expected}"
 
 
 @pytest.mark.parametrize(

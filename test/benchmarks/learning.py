@@ -26,7 +26,7 @@ from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.choosing import convert
-from rebt_ros.decision_tree.encoding import encode
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, encode
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.options import DEFAULTS, LearnOptions
@@ -40,11 +40,11 @@ _FACTORS = (1.0, 10**0.5, 10.0)
 
 
 def relearn(settings: Settings) -> list[Figure]:
-    """Learning with default options: LAT, depth and PSA automatic, all levels judged in folds."""
+    """Learning with default options: all is chosen, and all levels are judged in folds."""
     case = CASES["relearn"]
     case = replace(case, rows=settings.size(case.rows, 400))
     rows = rows_of(case)
-    matrix = encode(rows, last_action=False)
+    matrix = encode(rows, FEATURES_ALONE)
     subjects: dict[str, Callable[[], float]] = {
         "ours": timed(lambda: learn_from(rows)),
         "limit": timed(lambda: DecisionTreeClassifier(random_state=0).fit(matrix, rows.chosen)),
@@ -87,7 +87,7 @@ def relearn_large(settings: Settings) -> list[Figure]:
 def rules(settings: Settings) -> list[Figure]:
     """Each pruning level from its decision tree to its minimized behavior tree."""
     rows = table(settings.size(20_000, 500), 20)
-    fitted = fit(rows, last_action=False)
+    fitted = fit(rows)
     counts = fitted.path.leaf_counts().tolist()
     levels = dict(zip(counts, fitted.path.alphas, strict=True))
     small = [one for one in sorted(levels) if 1 < one <= 40]
@@ -140,13 +140,13 @@ def growth(settings: Settings) -> list[Figure]:
         for name, case in cases.items()
     ]
     rows = table(settings.size(20_000, 500), 10, noise=0.3)
-    fitted = fit(rows, last_action=False)
+    fitted = fit(rows)
     alphas = fitted.path.alphas
 
     def judges(factor: float) -> Callable[[], float]:
         places = np.linspace(0, len(alphas) - 1, round(len(alphas) * factor / _FACTORS[-1]))
         some = alphas[places.astype(int)]
-        return timed(lambda: fitted.agreements(rows, some))
+        return timed(lambda: fitted.hits(rows, some))
 
     name = f"levels to judge, up to {len(alphas)}"
     return [*figures, _exponent(name, settings, {factor: judges(factor) for factor in _FACTORS})]

@@ -10,14 +10,15 @@ from harness import Figure, Settings, alternate, compared, timed
 from py_trees.common import Status
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.prediction import States, choose, last_action_column
+from rebt_ros.behavior_tree.prediction import States, choose, history_columns
 from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.choosing import convert
-from rebt_ros.decision_tree.encoding import encode
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, encode
 from rebt_ros.decision_tree.training import fit
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.evaluation import actions_of
 from rebt_ros.logic.conditions import Interval, Threshold
-from rebt_ros.options import DEFAULTS
+from rebt_ros.options import DEFAULTS, LearnOptions, Use
 from rebt_ros.pipeline import Learning, learn_from
 
 
@@ -59,9 +60,9 @@ def by_hand(node: nodes.Node, state: State, place: dict[str, int]) -> py_trees.b
     match node:
         case nodes.Condition(literal=literal):
             match literal.condition:
-                case Threshold(feature=feature, value=value):
+                case Threshold(quantity=str(feature), value=value):
                     bounds = (float("-inf"), value)
-                case Interval(feature=feature, above=above, at_most=at_most):
+                case Interval(quantity=str(feature), above=above, at_most=at_most):
                     bounds = (above, at_most)
                 case other:
                     raise ValueError(f"{other} is not for this benchmark")
@@ -93,7 +94,8 @@ def _tree_of_about(size: int, learning: Learning) -> nodes.Node:
 
 def tick(settings: Settings) -> list[Figure]:
     """One tick of a learned tree with about 50 nodes."""
-    learning = learn_from(table(settings.size(5000, 500), 20))
+    options = LearnOptions(history=History.NONE, differences=Use.NEVER)
+    learning = learn_from(table(settings.size(5000, 500), 20), options)
     tree = _tree_of_about(50, learning)
     runtime = TreeRuntime(learning.learned, tree=tree)
     state = State()
@@ -128,19 +130,19 @@ def predict(settings: Settings) -> list[Figure]:
     learning = learn_from(table(settings.size(20_000, 500), 20))
     rows = settings.size(1_000_000, 5000)
     many = table(rows, 20, seed=1)
-    pruned = fit(learning.table, last_action=False).at(learning.policy.ccp_alpha)
+    pruned = fit(learning.table).at(learning.policy.ccp_alpha)
     depth = pruned.tree.depth
     # scikit-learn's own tree of the same depth and leaves, without those that pruning cut off.
     from sklearn.tree import DecisionTreeClassifier
 
     classifier = DecisionTreeClassifier(ccp_alpha=learning.policy.ccp_alpha, random_state=0)
-    classifier.fit(encode(learning.table, last_action=False), learning.table.chosen)
-    matrix = encode(many, last_action=False)
+    classifier.fit(encode(learning.table, FEATURES_ALONE), learning.table.chosen)
+    matrix = encode(many, FEATURES_ALONE)
     tree = learning.learned.tree
-    column = last_action_column(many.actions, many.last)
+    columns = history_columns(many.actions, many.previous, many.last)
 
     def ours() -> object:
-        return choose(tree, actions_of(many), States(many.features, many.states, column))
+        return choose(tree, actions_of(many), States(many.features, many.states, columns))
 
     spreads = alternate(
         {"ours": timed(ours), "limit": timed(lambda: classifier.predict(matrix))}, settings.rounds

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -15,9 +16,17 @@ from rosbags.typesys import Stores, get_typestore
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, SuggestionKind
-from rebt_ros.demonstration.demonstration import Row
+from rebt_ros.demonstration.demonstration import Row, RowKind
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.logic.conditions import HasCategory, Interval, IsTrue, LastActionIs, Literal
+from rebt_ros.logic.conditions import (
+    HasCategory,
+    Interval,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    PreviousActionIs,
+)
 from rebt_ros.storage.recording import RecordingWriter
 
 ACTION, STATE = "std_msgs/msg/String", "std_msgs/msg/Float64MultiArray"
@@ -46,11 +55,15 @@ def _everything() -> LearnedTree:
             ),
             nodes.Condition(Literal(Interval("battery", 0.1, 0.7))),
             nodes.Condition(~some.at_most("distance before", 1e-300)),
+            nodes.Condition(~Literal(PreviousActionIs("go"))),
+            nodes.Condition(some.at_most(some.DIFFERENCE, 0.0)),
+            nodes.Condition(Literal(Interval(some.DIFFERENCE, -0.1, 1e300))),
         )
     )
     psa = Suggestion("psa-1", SuggestionKind.PSA, 3, tree.children[3], attached=True)
     loop = Suggestion("lat-1", SuggestionKind.LAT_REPEATER, 9, tree.children[4])
-    return LearnedTree(features, some.ACTIONS, tree, some.PROVENANCE, (psa, loop))
+    origin = replace(some.PROVENANCE, history=History.PREVIOUS, late_rows=2, late_seconds=0.1 + 0.2)
+    return LearnedTree(features, some.ACTIONS, tree, origin, (psa, loop), row_kind=RowKind.SAMPLE)
 
 
 def simple(label: str = "go") -> LearnedTree:
@@ -76,8 +89,17 @@ def _two_channels() -> LearnedTree:
 
 @cache
 def documents() -> tuple[str, ...]:
-    """Behavior tree documents."""
-    return tuple(map(dumps, (_everything(), simple(), _two_channels())))
+    """Behavior tree documents, one of them as version 2 was."""
+    written = tuple(map(dumps, (_everything(), simple(), _two_channels())))
+    old = json.loads(written[1])
+    old["version"] = 2
+    del old["row_kind"]
+    origin = old["provenance"]
+    origin["uses_last_action"] = origin.pop("history") != "none"
+    for added in ("late_rows", "late_seconds"):
+        del origin[added]
+    del origin["figures"]["mean_recall"]
+    return (*written, json.dumps(old))
 
 
 def recordings(directory: Path) -> tuple[bytes, ...]:
