@@ -117,8 +117,7 @@ def choose(
     if options.simplest and options.upsample is Upsampling.NONE:
         fitted = simplest(choice.shown, fitted)
         if fitted is not judged.fitted:
-            # A level that is asked for is one of this tree.
-            ccp_alpha = _asked_for(fitted, options) or ccp_alpha
+            ccp_alpha = _of_another_fit(judged.fitted, ccp_alpha, fitted, options)
             reasons.append(
                 f"Of the trees that fit the rows, one with {fitted.leaves} leaves is the simplest "
                 f"({judged.fitted.leaves} where splits are chosen greedily)."
@@ -136,6 +135,15 @@ def _asked_for(fitted: FittedTree, options: LearnOptions) -> float | None:
             "a tree that does one thing whatever happens."
         )
     return float(fitted.path.alphas[options.level])
+
+
+def _of_another_fit(
+    judged: FittedTree, ccp_alpha: float, fitted: FittedTree, options: LearnOptions
+) -> float:
+    """Where to prune another fit to the same rows than the one whose levels were judged."""
+    asked = _asked_for(fitted, options)
+    # Its levels lie elsewhere: what was chosen is the range up to the next one.
+    return judged.path.middle(ccp_alpha) if asked is None else asked
 
 
 def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.Node:

@@ -225,6 +225,8 @@ class _Encoding:
             return math.nan
         if feature.kind is FeatureKind.CATEGORICAL:
             # Categories that were never shown are as good as missing, like on the robot.
+            if isinstance(value, bool) and str(value) in codes:
+                return codes[str(value)]
             text = value if isinstance(value, str) else category(float(value))
             return codes.get(text, math.nan)
         if isinstance(value, str):

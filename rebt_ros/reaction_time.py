@@ -53,6 +53,8 @@ _ALONE = 1.5
 _HALF_A_RUN = 0.45
 #: The explanation must be smaller by that many standard errors, and by that share.
 _STANDARD_ERRORS, _SHARE = 1.0, 0.1
+#: What takes a leaf or an exception for more than this share of the rows explains nothing.
+_LARGEST = 1 / 3
 
 _WITH_PREVIOUS = Vocabulary(history=History.PREVIOUS)
 
@@ -160,13 +162,17 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
 
     Delays up to 0.6 s (6 rows, where stamps tell no time) are tried; the longest one only shows
     that sizes rise again.  It takes the delay with the smallest explanation by states alone, unless
-    that is much larger than the one by states and previous actions without a delay: then the task
-    needs memory, and the delay with the smallest explanation of that kind is taken.  Of neighbours
-    that are equally small it is the one in the middle; if they reach to the longest delay, as where
-    the next states follow from the one before, the first of them.
+    that is much larger than the one by states and previous actions without a delay, or the delay is
+    about half of the time for which actions are held, or longer: then it takes the delay with the
+    smallest explanation by states and previous actions.  For a task that needs memory is hardly
+    explained by states alone; but who goes to and fro between two places looks as if the middle
+    told when to turn round, half a way late.  Of neighbours that are equally small it is the one in
+    the middle; if they reach to the longest delay, as where each state follows from the one before,
+    the first of them.
 
-    A delay is clear if its explanation is smaller than the one without a delay by a tenth and by a
-    standard error, where sizes are counts: of a and b, the standard error is the root of a + b.
+    A delay is clear if its explanation is smaller than a third of the rows, and smaller than the one
+    without a delay by a tenth and by a standard error, where sizes are counts: of a and b, the
+    standard error is the root of a + b.
 
     Args:
         table: Samples of one channel, in whole demonstrations.
@@ -178,8 +184,9 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
     why_not, most = _most(table, gap)
     if why_not:
         return ReactionTime(0, _seconds(0, gap), why_not)
-    trials, by_states_alone = _Explanations(table, most).trials()
-    rows = _clear(trials)
+    explanations = _Explanations(table, most)
+    trials, by_states_alone = explanations.trials()
+    rows = _clear(trials, len(explanations))
     sentence = _NOT_LATE
     if rows:
         seconds = _seconds(rows, gap)
@@ -237,6 +244,10 @@ class _Explanations:
         place, _ = _places(table)
         # Rows whose state and previous action are known whatever the delay is.
         self._rows = _stretches(np.flatnonzero(place >= most))
+
+    def __len__(self) -> int:
+        """Rows that are explained."""
+        return len(self._rows)
 
     def trials(self) -> tuple[tuple[Trial, ...], bool]:
         """What decides, by ascending delay, and whether it is about states alone."""
@@ -313,11 +324,11 @@ def _size(fitted: FittedTree) -> int:
     return int(sizes[0])
 
 
-def _clear(trials: Sequence[Trial]) -> int:
-    """The delay that is clear, or 0."""
+def _clear(trials: Sequence[Trial], explained: int) -> int:
+    """The delay that is clear, or 0, where so many rows are explained."""
     without, best = trials[0], _peak(trials)
-    if best is trials[-1]:
-        # Sizes may go on to fall.
+    # Where the longest delay is the best, sizes may go on to fall.
+    if best is trials[-1] or best.size > _LARGEST * explained:
         return 0
     gain = without.size - best.size
     least = max(_STANDARD_ERRORS * math.sqrt(without.size + best.size), _SHARE * without.size)

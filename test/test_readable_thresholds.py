@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import math
-from itertools import combinations
+from itertools import combinations, permutations
 
 import pytest
 from hypothesis import given, settings
@@ -10,6 +10,10 @@ from hypothesis import strategies as st
 from rebt_ros.decision_tree.readable_thresholds import roundest, shared_thresholds
 
 _VALUES = st.floats(-1e38, 1e38, allow_nan=False)
+#: Many of them begin or end together.
+_WHOLE_GAPS = st.tuples(st.integers(0, 12), st.integers(1, 6)).map(
+    lambda one: (float(one[0]), float(sum(one)))
+)
 _GAPS = st.tuples(_VALUES, _VALUES).filter(lambda ends: ends[0] != ends[1]).map(sorted).map(tuple)
 
 
@@ -48,11 +52,59 @@ def test_there_are_as_few_values_as_possible(gaps: list[tuple[int, int]]) -> Non
     assert len(set(shared_thresholds([(float(low), float(high)) for low, high in gaps]))) == fewest
 
 
-@given(st.lists(_GAPS, min_size=1, max_size=10), st.randoms())
+@given(st.lists(_GAPS | _WHOLE_GAPS, min_size=1, max_size=10), st.randoms())
 def test_the_order_of_the_gaps_does_not_matter(gaps: list[tuple[float, float]], random) -> None:
     found = dict(zip(gaps, shared_thresholds(gaps), strict=True))
     random.shuffle(gaps)
     assert dict(zip(gaps, shared_thresholds(gaps), strict=True)) == found
+
+
+@settings(max_examples=200)
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 30), st.integers(1, 12)).map(lambda one: (one[0], sum(one))),
+        min_size=1,
+        max_size=12,
+    )
+)
+def test_gaps_that_hold_all_of_another_do_not_change_its_value(
+    gaps: list[tuple[int, int]],
+) -> None:
+    floats = [(float(low), float(high)) for low, high in gaps]
+    found = dict(zip(floats, shared_thresholds(floats), strict=True))
+    apart = [
+        (low, high)
+        for low, high in floats
+        if not any(low <= a and b <= high and (a, b) != (low, high) for a, b in floats)
+    ]
+    assert dict(zip(apart, shared_thresholds(apart), strict=True)).items() <= found.items()
+
+
+def test_the_order_of_gaps_that_end_together_does_not_matter() -> None:
+    gaps = [(0.0, 1.0), (0.5, 1.0), (0.3, 5.0), (2.0, 3.0)]
+    wanted = dict(zip(gaps, shared_thresholds(gaps), strict=True))
+    for order in permutations(gaps):
+        assert dict(zip(order, shared_thresholds(order), strict=True)) == wanted
+
+
+def test_a_gap_that_a_later_value_serves_leaves_an_earlier_one_free() -> None:
+    assert shared_thresholds([(0.0, 1.0), (0.93, 5.0), (2.0, 3.0)]) == [0.5, 2.5, 2.5]
+
+
+@given(st.lists(_GAPS, max_size=10))
+def test_gaps_around_a_threshold_keep_it(gaps: list[tuple[float, float]]) -> None:
+    for value in set(shared_thresholds(gaps)):
+        assert roundest(value, math.nextafter(value, math.inf)) == value
+
+
+@given(st.integers(1, 9999), st.integers(1, 9999), st.integers(-200, 200))
+def test_powers_of_ten_do_not_change_how_round_a_threshold_is(
+    one: int, other: int, exponent: int
+) -> None:
+    low, high = sorted((one, one + other))
+    scaled = roundest(float(f"{low}e{exponent}"), float(f"{high}e{exponent}"))
+    # Ties between two equally round values may be broken otherwise.
+    assert _digits(scaled) == _digits(roundest(float(low), float(high)))
 
 
 def test_three_readings_of_one_border_become_one_round_value() -> None:

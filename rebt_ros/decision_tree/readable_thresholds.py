@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import math
 import sys
+from bisect import bisect_right
 from collections.abc import Sequence
+from decimal import Decimal
 
 #: A threshold keeps this share of a gap's width from its ends, as rows to come may lie a little
 #: beyond those that were shown, ...
@@ -25,30 +27,40 @@ _ALL_DIGITS = 17
 def shared_thresholds(gaps: Sequence[tuple[float, float]]) -> list[float]:
     """A threshold for each gap: as few values as possible, each as round as possible.
 
-    Greedy stabbing is minimal: the first of the gaps that ends next needs a value of its own, and
-    the largest one below its end serves every other gap that any of its values could serve first.
-    So all gaps that begin below that end are served at once, and wherever they all reach, the
-    roundest value is as good.
+    Greedy stabbing is minimal: going through the gaps by their ends, one that begins at or above
+    the end of the last chosen one is chosen as well.  The chosen gaps do not overlap, so that each
+    needs a value of its own, and every other gap holds all values just below the end of one.  Each
+    gap is served by the first chosen one with which that is so, or by the next one where it holds
+    all of that: there it leaves the value free to be round.
 
     Args:
         gaps: Of one quantity, each ``(low, high)`` with a finite low below high.
 
     Returns:
-        For each gap a value ``low <= t < high``, in O(n log n + n m) for m values.
+        For each gap a value ``low <= t < high``, in O(n log n).
 
     >>> shared_thresholds([(0.1952, 0.204), (0.1987, 0.231), (0.19, 0.2019), (0.6, 0.92)])
     [0.2, 0.2, 0.2, 0.8]
+    >>> shared_thresholds([(0.0, 1.0), (0.93, 5.0), (2.0, 3.0)])
+    [0.5, 2.5, 2.5]
     """
-    thresholds = [0.0] * len(gaps)
-    waiting = sorted(range(len(gaps)), key=lambda place: gaps[place][1])
-    while waiting:
-        end = gaps[waiting[0]][1]
-        served = [place for place in waiting if gaps[place][0] < end]
-        value = roundest(max(gaps[place][0] for place in served), end)
-        for place in served:
-            thresholds[place] = value
-        waiting = [place for place in waiting if gaps[place][0] >= end]
-    return thresholds
+    lows: list[float] = []
+    ends: list[float] = []
+    # Of those that end together the innermost, so that their order does not matter.
+    for low, high in sorted(gaps, key=lambda gap: (gap[1], -gap[0])):
+        if not ends or low >= ends[-1]:
+            lows.append(low)
+            ends.append(high)
+    serving, reached = [], list(lows)
+    for low, high in gaps:
+        # The first chosen gap that ends above; this one ends there or later.
+        place = bisect_right(ends, low)
+        if low > lows[place] and place + 1 < len(ends) and ends[place + 1] <= high:
+            place += 1
+        reached[place] = max(reached[place], low)
+        serving.append(place)
+    values = [roundest(low, end) for low, end in zip(reached, ends, strict=True)]
+    return [values[place] for place in serving]
 
 
 def roundest(low: float, high: float) -> float:
@@ -78,13 +90,10 @@ def _roundest(low: float, high: float, middle: float, digits: int) -> float | No
         return None
     first = math.floor(math.log10(largest)) + 1
     for exponent in range(first, first - digits - 1, -1):
-        step = float(f"1e{exponent}")
-        if not 0 < step < math.inf:
-            continue
-        # Rounding can make the first and the last multiple miss by one.
+        # As decimals, since a power of ten far from 1 is not exact as a double.
         multiples = {
-            round(place) + off
-            for place in (low / step, middle / step, high / step)
+            round(Decimal(value).scaleb(-exponent)) + off
+            for value in (low, middle, high)
             for off in (-1, 0, 1)
         }
         inside = [

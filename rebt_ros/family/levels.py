@@ -136,7 +136,11 @@ class Family:
         judged = self.learning.policy.levels
         if judged is None:
             return None
-        for place in np.flatnonzero(judged.ccp_alphas == ccp_alpha):
+        places = np.flatnonzero(judged.ccp_alphas == ccp_alpha)
+        if not np.isin(judged.ccp_alphas, self.ccp_alphas).all():
+            # Another fit was judged: its level that a ``ccp_alpha`` comes to is the same.
+            places = np.array([judged.at(ccp_alpha)])
+        for place in places:
             figures = (judged.mean_recalls, judged.means, judged.standard_errors)
             return CrossValidated(*(float(one[place]) for one in figures))
         return None

@@ -12,7 +12,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool
 
-from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.ros.command_channels import DRIVING_QOS
 from rebt_ros.ros.trial_peer import PATIENCE, TrialPeer
 from rebt_ros.trial.candidates import Candidate
@@ -154,7 +153,7 @@ class ExecutorHandle:
         """Whether the tree that runs is a candidate's, by the latest report."""
         if self._values is None or candidate is None:
             return False
-        return self._values.get("document") == fingerprint(candidate.document)
+        return self._values.get("document") == candidate.fingerprint
 
     def _on_tree(self, message: String) -> None:
         # What is published here comes back, in its order.

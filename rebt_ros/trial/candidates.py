@@ -11,6 +11,7 @@ from typing import Any
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps
+from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.errors import InputError
 from rebt_ros.storage.text import read_text
@@ -29,6 +30,11 @@ class Candidate:
     def document(self) -> str:
         """What the executor is sent."""
         return dumps(self.learned)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """By which the executor names that."""
+        return fingerprint(self.document)
 
     @property
     def nodes(self) -> int:

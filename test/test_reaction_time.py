@@ -1,0 +1,324 @@
+"""How late a demonstrator acted: read off the demonstrations, and undone."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import strategies as some
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from rebt_ros import reaction_time
+from rebt_ros.decision_tree.encoding import Vocabulary
+from rebt_ros.decision_tree.training import FittedTree, fit
+from rebt_ros.demonstration.last_action import (
+    NO_ACTION,
+    History,
+    last_actions,
+    previous_actions,
+)
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import OptionError
+from rebt_ros.reaction_time import ReactionTime, Trial, estimate, rows_in, shifted
+
+X = (Feature("x"), Feature("noise"))
+LEFT, RIGHT, STAY = 0, 1, 2
+#: Nanoseconds.
+TENTH = 100_000_000
+
+
+def joined(*shown: tuple[list[list[float]], list[int]]) -> DemonstrationTable:
+    """A table of demonstrations, each its states and its actions."""
+    states = [state for its, _ in shown for state in its]
+    chosen = [code for _, its in shown for code in its]
+    number = [place for place, (_, its) in enumerate(shown) for _ in its]
+    return some.table(states, chosen, number, X)
+
+
+def acted_late(decide: Iterator[int], late: int) -> Callable[[], int]:
+    """What is done now: what was decided so many steps before, or first of all."""
+    decided: list[int] = []
+
+    def act() -> int:
+        decided.append(next(decide))
+        return decided[max(0, len(decided) - 1 - late)]
+
+    return act
+
+
+def shuttle(
+    late: int, seed: int, turns: int = 6, leg: float = 10
+) -> tuple[list[list[float]], list[int]]:
+    """To and fro between 0 and `leg`, about half a metre at a time: this needs memory."""
+    chance = random.Random(seed)
+    x, target = chance.uniform(1, leg - 1), RIGHT
+
+    def decide() -> Iterator[int]:
+        while True:
+            yield target
+
+    act = acted_late(decide(), late)
+    states, actions = [], []
+    while turns:
+        states.append([x, chance.random()])
+        actions.append(act())
+        x += (1 if actions[-1] == RIGHT else -1) * chance.uniform(0.4, 0.6)
+        if x >= leg if target == RIGHT else x <= 0:
+            target, turns = LEFT + RIGHT - target, turns - 1
+    return states, actions
+
+
+def balancing(late: int, seed: int, rows: int = 120) -> tuple[list[list[float]], list[int]]:
+    """Keeps x near 0 against a wind: states alone tell what to do."""
+    chance = random.Random(seed)
+    x = chance.uniform(-3, 3)
+
+    def decide() -> Iterator[int]:
+        while True:
+            yield LEFT if x > 1 else RIGHT if x < -1 else STAY
+
+    act = acted_late(decide(), late)
+    states, actions = [], []
+    for _ in range(rows):
+        states.append([x, chance.random()])
+        actions.append(act())
+        x += (0, 0.3, 0)[actions[-1]] - 0.3 * (actions[-1] == LEFT) + chance.gauss(0, 0.4)
+    return states, actions
+
+
+def shuttles(late: int, count: int = 20) -> DemonstrationTable:
+    return joined(*(shuttle(late, seed) for seed in range(count)))
+
+
+def balancings(late: int, count: int = 5) -> DemonstrationTable:
+    return joined(*(balancing(late, seed) for seed in range(count)))
+
+
+def by_chance(rows: int, count: int, seed: int) -> DemonstrationTable:
+    chance = np.random.default_rng(seed)
+    return joined(
+        *(
+            (chance.normal(size=(rows, 2)).tolist(), chance.integers(0, 3, rows).tolist())
+            for _ in range(count)
+        )
+    )
+
+
+def paced(table: DemonstrationTable, gap: int) -> DemonstrationTable:
+    """The same with a row in so many nanoseconds."""
+    return replace(table, stamps=table.stamps * gap)
+
+
+# --- moving actions back ------------------------------------------------------------------------
+
+
+def test_each_row_gets_the_action_of_some_rows_later_in_its_demonstration() -> None:
+    states = [[float(row), 0.0] for row in range(9)]
+    table = some.table(states, [0, 1, 2, 3, 0, 1, 2, 3, 0], [0, 0, 0, 0, 1, 1, 2, 2, 2], X)
+    moved = shifted(table, 2)
+    assert moved.states[:, 0].tolist() == [0, 1, 6]
+    assert moved.stamps.tolist() == [0, 1, 6]
+    assert moved.chosen.tolist() == [2, 3, 0]
+    assert moved.demonstration.tolist() == [0, 0, 2]
+    assert moved.demonstrations == table.demonstrations
+    assert moved.previous.tolist() == [NO_ACTION, 2, NO_ACTION]
+    assert moved.last.tolist() == [NO_ACTION, 2, NO_ACTION]
+
+
+@given(some.tables())
+def test_no_delay_changes_nothing(table: DemonstrationTable) -> None:
+    assert shifted(table, 0) is table
+
+
+@st.composite
+def begun_before(draw: st.DrawFn) -> DemonstrationTable:
+    """Tables, some of whose demonstrations began amid something else."""
+    table = draw(some.tables(min_rows=8, max_demonstrations=2))
+    first = np.searchsorted(table.demonstration, np.arange(len(table.demonstrations)))
+    before = np.full(len(table.demonstrations), NO_ACTION)
+    for place in np.unique(table.demonstration).tolist():
+        others = set(range(len(some.LABELS))) - {int(table.chosen[first[place]])}
+        before[place] = draw(st.sampled_from([NO_ACTION, *sorted(others)]))
+    return replace(table, before=draw(st.sampled_from([None, before])))
+
+
+@given(begun_before(), st.integers(1, 2), st.integers(1, 2))
+def test_two_delays_add_up(table: DemonstrationTable, first: int, second: int) -> None:
+    assume(np.bincount(table.demonstration).max() > first + second)
+    twice, once = shifted(shifted(table, first), second), shifted(table, first + second)
+    for name in ("states", "chosen", "demonstration", "stamps", "last", "previous"):
+        np.testing.assert_array_equal(getattr(twice, name), getattr(once, name))
+
+
+@given(begun_before(), st.integers(1, 4))
+def test_what_was_done_before_follows_from_the_moved_actions(
+    table: DemonstrationTable, rows: int
+) -> None:
+    lengths = np.bincount(table.demonstration)
+    assume(lengths.max() > rows)
+    moved = shifted(table, rows)
+    assert len(moved) == np.maximum(lengths - rows, 0).sum()
+    np.testing.assert_array_equal(
+        moved.previous, previous_actions(moved.chosen, moved.demonstration)
+    )
+    assert not (moved.last == moved.chosen).any()
+    if table.before is None:
+        np.testing.assert_array_equal(moved.last, last_actions(moved.chosen, moved.demonstration))
+
+
+def test_a_delay_longer_than_all_demonstrations_is_refused_in_one_sentence() -> None:
+    with pytest.raises(OptionError) as refused:
+        shifted(shuttles(0, 2), 1000)
+    assert str(refused.value) == (
+        "no demonstration is longer than a reaction time of 1000 rows: give a shorter one."
+    )
+
+
+def test_seconds_are_rows_where_stamps_tell_time() -> None:
+    table = paced(shuttles(0, 2), TENTH)
+    assert [rows_in(table, seconds) for seconds in (0, 0.04, 0.06, 0.2)] == [0, 0, 1, 2]
+    assert rows_in(shuttles(0, 2), 0) == 0
+    with pytest.raises(OptionError, match=r"needs rows with stamps.*'stamp'"):
+        rows_in(shuttles(0, 2), 0.2)
+
+
+# --- reading it off -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("late", range(6))
+@pytest.mark.parametrize("task", [shuttles, balancings])
+def test_a_delay_is_found_and_undone_exactly(
+    task: Callable[[int], DemonstrationTable], late: int
+) -> None:
+    table = task(late)
+    found = estimate(table)
+    assert found.rows == late
+    assert found.is_clear is (late > 0)
+    # The first rows of a late demonstrator answer to no state.
+    moved = shifted(table, found.rows)
+    assert explained(moved) == 0
+
+
+def explained(table: DemonstrationTable) -> int:
+    """Rows that a tree of eight leaves gets wrong."""
+    place = np.arange(len(table)) - np.searchsorted(table.demonstration, table.demonstration)
+    table = table.where(place > 0)
+    vocabulary = Vocabulary(history=History.PREVIOUS)
+    trained = fit(table, vocabulary=vocabulary, max_depth=3).at(0.0)
+    return int(np.count_nonzero(trained.predict(table) != table.chosen))
+
+
+@pytest.mark.parametrize(("gap", "late"), [(TENTH, 3), (TENTH // 2, 4), (TENTH // 2, 9)])
+def test_a_delay_is_told_in_seconds(gap: int, late: int) -> None:
+    found = estimate(paced(balancings(late), gap))
+    assert found.rows == late
+    assert found.seconds == pytest.approx(late * gap / 1e9)
+    assert found.sentence == (
+        f"the demonstrator acted {late * gap / 1e9:.2f} s ({late} rows) late; "
+        "actions are learned as of when they were due"
+    )
+
+
+def test_without_time_a_delay_is_told_in_rows() -> None:
+    found = estimate(balancings(1))
+    assert found.seconds is None
+    assert found.sentence.startswith("the demonstrator acted 1 row late;")
+
+
+@pytest.mark.parametrize("leg", [3, 5, 10])
+@pytest.mark.parametrize("gap", [1, TENTH // 2])
+def test_going_to_and_fro_without_delay_does_not_look_late(leg: int, gap: int) -> None:
+    table = joined(*(shuttle(0, seed, turns=8, leg=leg) for seed in range(5)))
+    assert estimate(paced(table, gap)).rows == 0
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_no_delay_shows_in_random_actions(seed: int) -> None:
+    found = estimate(by_chance(80, 1 + 3 * (seed % 3), seed))
+    assert (found.rows, found.is_clear) == (0, False)
+    assert len(found.trials) == 7
+
+
+def test_no_delay_shows_where_people_err_only() -> None:
+    chance = np.random.default_rng(0)
+    table = balancings(0, 8)
+    wrong = chance.random(len(table)) < 0.05
+    chosen = np.where(wrong, chance.integers(0, 3, len(table)), table.chosen)
+    erring = replace(table, chosen=chosen, previous=previous_actions(chosen, table.demonstration))
+    assert estimate(erring).rows == 0
+
+
+@given(some.tables(max_rows=30))
+def test_little_is_shown_and_nothing_is_found(table: DemonstrationTable) -> None:
+    found = estimate(table)
+    assert found.rows == 0
+    assert found.sentence
+
+
+@pytest.mark.parametrize(
+    ("table", "why"),
+    [
+        (joined(([[1.0, 0.0]], [LEFT])), "one action is taken all the time"),
+        (joined(*[([[1.0, 0.0], [2.0, 0.0]], [LEFT, RIGHT])] * 9), "demonstrations are too short"),
+        (paced(balancings(3), 5 * TENTH), "rows are too far apart"),
+        (
+            replace(balancings(3), stamps=np.cumsum(np.arange(600) % 7 * TENTH)),
+            "not evenly spaced",
+        ),
+    ],
+)
+def test_it_is_said_why_nothing_can_be_told(table: DemonstrationTable, why: str) -> None:
+    found = estimate(table)
+    assert (found.rows, found.trials) == (0, ())
+    assert why in found.sentence
+
+
+def test_states_alone_decide_unless_the_task_needs_memory() -> None:
+    assert estimate(balancings(1)).by_states_alone
+    assert not estimate(shuttles(1)).by_states_alone
+
+
+def test_the_same_table_gives_the_same_estimate() -> None:
+    assert estimate(balancings(2)) == estimate(balancings(2))
+    assert estimate(shuttles(2)) == estimate(shuttles(2))
+
+
+# --- what it costs --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def fits(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Rows of each tree that is fitted."""
+    rows: list[int] = []
+
+    def counted(table: DemonstrationTable, *, vocabulary: Vocabulary) -> FittedTree:
+        rows.append(len(table))
+        return fit(table, vocabulary=vocabulary)
+
+    monkeypatch.setattr(reaction_time, "fit", counted)
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("gap", "most"), [(1, 14), (TENTH, 14), (TENTH // 2, 24), (TENTH // 10, 40)]
+)
+def test_few_rows_are_fitted_few_times(fits: list[int], gap: int, most: int) -> None:
+    estimate(paced(by_chance(2000, 4, 0), gap))
+    assert len(fits) <= most
+    assert max(fits) <= 2000
+
+
+def test_where_nothing_could_be_simpler_nothing_else_is_tried(fits: list[int]) -> None:
+    table = balancings(0)
+    assert estimate(table) == ReactionTime(
+        0,
+        None,
+        "no reaction time shows: actions are learned as of when they were taken",
+        (Trial(0, 3),),
+    )
+    assert len(fits) == 2
