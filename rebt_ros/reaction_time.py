@@ -170,8 +170,8 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
     the middle; if they reach to the longest delay, as where each state follows from the one before,
     the first of them.
 
-    A delay is clear if its explanation is smaller than a third of the rows, and smaller than the one
-    without a delay by a tenth and by a standard error, where sizes are counts: of a and b, the
+    A delay is clear if its explanation is not larger than a third of the rows, and smaller than the
+    one without a delay by a tenth and by a standard error, where sizes are counts: of a and b, the
     standard error is the root of a + b.
 
     Args:

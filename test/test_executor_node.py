@@ -30,6 +30,7 @@ from ros_processes import AGES, NodeProcess, Peer, values_of
 from std_msgs.msg import String
 
 from rebt_ros.behavior_tree.document import dumps
+from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.nodes import (
     Action,
     Condition,
@@ -346,3 +347,26 @@ def test_channels_are_commanded_side_by_side_each_on_a_topic_of_its_own(
         # A tree of one channel takes over, on the one topic.
         publish(peer, learned(where_x_is_small(GO, TURN)))
         robot.obeys("turn")
+
+
+def test_it_says_which_document_it_runs(domain: int, peer: Peer, tmp_path: Path) -> None:
+    with NodeProcess("executor_node", domain, tmp_path):
+        for tree in (learned(Selector((GO,))), learned(Selector((TURN,)))):
+            publish(peer, tree)
+            status(peer, "disabled", document=fingerprint(dumps(tree)))
+
+
+def test_a_tree_that_runs_and_comes_again_takes_the_place_of_one_that_waits(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("executor_node", domain, tmp_path):
+        running = learned(Selector((GO,)))
+        publish(peer, running)
+        status(peer, "disabled", nodes="2")
+        publish(peer, learned(where_x_is_small(GO, TURN)))
+        status(peer, "disabled", the_next_tree_waits_for="state")
+        publish(peer, running)
+        peer.wait_until(
+            lambda: "the next tree waits for" not in values_of(peer.diagnostics[EXECUTION])
+        )
+        assert report(peer)["nodes"] == "2"

@@ -215,3 +215,7 @@ def test_what_is_learned_says_what_was_shown_of_all_features_but_lagged_ones() -
     for leaf in channel.leaves:
         assert leaf.values[1] == Span(5.0, 5.0)
         assert leaf.values[3:] == (None,) * 3
+
+
+def test_a_tree_that_reads_nothing_finds_nothing_novel() -> None:
+    assert NoveltyDetector(_learned(NEAR, FAR), (), "state", 0.1).departure({}) is None

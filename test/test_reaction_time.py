@@ -187,6 +187,11 @@ def test_seconds_are_rows_where_stamps_tell_time() -> None:
         rows_in(shuttles(0, 2), 0.2)
 
 
+def test_a_reaction_time_can_be_said() -> None:
+    said = reaction_time.given(paced(shuttles(0, 2), TENTH), 0.3)
+    assert (said.rows, said.seconds, said.trials) == (3, 0.3, ())
+
+
 # --- reading it off -----------------------------------------------------------------------------
 
 
@@ -242,6 +247,16 @@ def test_no_delay_shows_in_random_actions(seed: int) -> None:
     found = estimate(by_chance(80, 1 + 3 * (seed % 3), seed))
     assert (found.rows, found.is_clear) == (0, False)
     assert len(found.trials) == 7
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_delay_shows_in_actions_that_are_held_by_chance(seed: int) -> None:
+    table = by_chance(80, 4, seed)
+    place = np.arange(len(table))
+    changes = (np.random.default_rng(seed).random(len(table)) < 0.1) | (place % 80 == 0)
+    chosen = table.chosen[np.maximum.accumulate(np.where(changes, place, 0))]
+    held = replace(table, chosen=chosen, previous=previous_actions(chosen, table.demonstration))
+    assert estimate(held).rows == 0
 
 
 def test_no_delay_shows_where_people_err_only() -> None:

@@ -72,9 +72,9 @@ class NoveltyDetector:
             for place, feature in enumerate(learned.features)
             if not feature.lag and (feature.topic or default_topic) in topics
         )
-        self._channels = tuple(
-            _Ranges(one, self._columns, margin) for one in learned.shown if one.leaves
-        )
+        # A tree that reads nothing has nothing to compare.
+        shown = learned.shown if self._columns else ()
+        self._channels = tuple(_Ranges(one, self._columns, margin) for one in shown if one.leaves)
 
     def departure(self, latest: Mapping[str, Sequence[float]]) -> Departure | None:
         """How the state differs from what was shown; None where it does not.
@@ -83,7 +83,7 @@ class NoveltyDetector:
             latest: The newest message of every topic.  What it does not hold, or holds as NaN, is
                 not compared.
         """
-        if not self._channels or not self._columns:
+        if not self._channels:
             return None
         values = np.array([column.value(latest) for column in self._columns])
         for ranges in self._channels:

@@ -196,7 +196,8 @@ def _write_plot(directory: Path, family: Family) -> list[str]:
         judged.ccp_alphas,
         judged.means,
         judged.standard_errors,
-        family.leaves[np.searchsorted(family.ccp_alphas, judged.ccp_alphas)],
+        # The levels of another fit may have been judged: each comes to one of this tree.
+        family.leaves[np.searchsorted(family.ccp_alphas, judged.ccp_alphas, side="right") - 1],
         policy.ccp_alpha,
     )
     notes: list[str] = []

@@ -143,6 +143,9 @@ class ExecutorNode(Node):
             if isinstance(prepared, DocumentError):
                 self._refuse(str(prepared))
             elif self._program is not None and prepared.document == self._program.document:
+                # It stays, whatever came in between.
+                self._discard_candidate()
+                self._subscribe()
                 self._preparation.retire(prepared)
             else:
                 self._propose(prepared)
@@ -184,6 +187,8 @@ class ExecutorNode(Node):
         self._candidate = None
         self._install(candidate)
         self._say_who_drives()
+        # Who has sent it waits for that.
+        self._diagnostics.publish()
 
     def _discard_candidate(self) -> None:
         if self._candidate is not None:
@@ -429,6 +434,7 @@ class ExecutorNode(Node):
         if self._program is not None:
             learned = self._program.learned
             values |= {
+                "document": self._program.fingerprint,
                 "nodes": nodes.size(learned.tree),
                 "actions": len(learned.actions),
                 "rows": learned.provenance.rows,

@@ -11,6 +11,7 @@ from rclpy.validate_topic_name import validate_topic_name
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import loads
+from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.novelty import NoveltyDetector
 from rebt_ros.behavior_tree.runtime import Commander, TreeRuntime, executable
@@ -26,6 +27,8 @@ class TreeProgram:
     """A tree that is ready to be ticked."""
 
     document: str
+    fingerprint: str
+    """Of the document."""
     runtime: TreeRuntime
     inputs: TreeInputs
     novelty: NoveltyDetector
@@ -93,6 +96,7 @@ class Preparation:
         }
         return TreeProgram(
             document,
+            fingerprint(document),
             TreeRuntime(learned, self._commander, executable(learned.tree), histories),
             inputs,
             NoveltyDetector(learned, inputs.topics, topic, self._settings.novelty.margin),
