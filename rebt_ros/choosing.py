@@ -42,7 +42,7 @@ _FEWEST_ROWS = 20
 
 #: Of larger tables, so many rows, by whole demonstrations, tell what a tree may test; the level is
 #: chosen by all.
-_LARGE, _ROWS_THAT_TELL = 6_000, 3_000
+_LARGE, _ROWS_THAT_TELL = 6_000, 2_000
 
 #: How much agreement differences may cost, and to which share of the leaves they have to come.
 _DEARER, _SMALLER = 0.005, 0.75

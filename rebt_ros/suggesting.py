@@ -45,7 +45,7 @@ _TOO_LARGE = (
 #: nested loops takes longer than learning does in many more.
 _MOST_ROWS = 100_000
 #: Rows that the LAT-augmented tree is fitted to.
-_MOST_ROWS_FITTED = 10_000
+_MOST_ROWS_FITTED = 5_000
 
 
 def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[FoundRoutine, ...]:

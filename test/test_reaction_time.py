@@ -293,6 +293,29 @@ def test_it_is_said_why_nothing_can_be_told(table: DemonstrationTable, why: str)
     assert why in found.sentence
 
 
+@pytest.mark.parametrize(
+    ("sizes", "rows"),
+    [
+        ([30, 28, 26, 21, 14, 22, 30], 4),
+        ([30, 28, 26, 25, 24, 25, 30], 0),  # less than a standard error
+        ([30, 14, 13, 13, 13, 14, 30], 3),  # the middle of a valley
+        ([30, 14, 13, 13, 14, 14, 30], 2),
+        ([30, 14, 13, 13, 13, 13, 13], 2),  # where each state follows from the one before
+        ([30, 28, 26, 24, 20, 15, 10], 0),  # may go on to fall
+        ([10, 12, 15, 20, 24, 26, 28], 0),
+    ],
+)
+def test_a_delay_is_taken_where_sizes_have_a_clear_valley(
+    sizes: list[int], rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Without a delay states with the previous action are asked for, too.
+    left = iter([sizes[0], 99, *sizes[1:]])
+    monkeypatch.setattr(reaction_time, "_size", lambda _: next(left))
+    found = estimate(shuttles(0))
+    assert found.trials == tuple(Trial(*one) for one in enumerate(sizes))
+    assert found.rows == rows
+
+
 def test_states_alone_decide_unless_the_task_needs_memory() -> None:
     assert estimate(balancings(1)).by_states_alone
     assert not estimate(shuttles(1)).by_states_alone
