@@ -205,15 +205,16 @@ def learn_from(
         options: How to learn.
         progress: Told what is being done and which share of the work is behind.
     """
+    late = reaction_time_of(table, options)
+    table = shifted(table, late.rows)
     if len(np.unique(table.chosen)) < 2:
         shown = table.actions[table.chosen[0]]
         raise InputError(
             f"the {len(table)} rows of channel {table.channel!r} show one action only ({shown!r}): "
             "demonstrate at least two, as there is nothing to decide between."
         )
-    late = reaction_time_of(table, options)
     # Before any rows are set apart, so that each still knows those before it.
-    table = with_lags(shifted(table, late.rows), options.lags)
+    table = with_lags(table, options.lags)
     held_out = table.held_out(options.test_fraction)
     shown = table.where(~held_out)
     progress("choosing", _CHOOSING)
