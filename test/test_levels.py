@@ -333,3 +333,21 @@ def test_the_command_writes_levels_on_request(
     learn_command.main([*arguments, "--history", "none", "--levels", "--most-levels", "4"])
     assert "levels/" in capsys.readouterr().out
     assert len(entries(tmp_path / "out")) <= 4
+
+
+def test_levels_are_written_and_plotted_where_a_simpler_tree_took_the_place_of_the_greedy_one(
+    tmp_path: Path,
+) -> None:
+    # Neither half of an exclusive or tells anything alone, so that greedy splits go astray.
+    source = np.random.default_rng(0)
+    inputs = []
+    for number in range(4):
+        rows = source.random((60, 3)).round(2)
+        lines = [f"{a},{b},{c},{'go' if (a > 0.5) != (b > 0.5) else 'stop'}" for a, b, c in rows]
+        path = tmp_path / f"{number}.csv"
+        path.write_text("\n".join(["a,b,c,action", *lines]) + "\n")
+        inputs.append(path)
+    result = offline.learn(inputs, out=tmp_path / "out", levels=True)
+    assert any("simplest" in reason for reason in result.learnings[0].policy.reasons)
+    entries = json.loads((tmp_path / "out" / "levels" / "summary.json").read_text())
+    assert all(entry["cross_validated_agreement"] is not None for entry in entries)
