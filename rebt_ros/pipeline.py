@@ -216,27 +216,10 @@ def learn_from(
     # Before any rows are set apart, so that each still knows those before it.
     table = with_lags(table, options.lags)
     held_out = table.held_out(options.test_fraction)
-    shown = table.where(~held_out)
-    progress("choosing", _CHOOSING)
-    # Of few rows each one counts, also for what is chosen: it is chosen once more from all.  So it
-    # is where a level is asked for, which is one of the tree that is published.
-    again = options.refit and (len(table) <= _CHOSEN_FROM_ALL or options.level is not None)
-
-    def advance(share: float) -> None:
-        progress("choosing", _CHOOSING + (_JUDGING - _CHOOSING) * share)
-
-    if options.refit and not again:
-        policy = choose(table, options, advance, held_out)
-    else:
-        policy = choose(shown, replace(options, level=None) if again else options, advance)
-    progress("judging", _JUDGING)
-    judge, ccp_alpha = policy.fitted, policy.ccp_alpha
-    learned_from = shown
-    if options.refit:
-        progress("learning from all rows", _JUDGING)
-        learned_from = table
-        policy = choose(table, options) if again else _of_all(policy, options)
-        ccp_alpha = ccp_alpha if options.level is None else policy.ccp_alpha
+    judged, policy = _chosen(table, held_out, options, progress)
+    learned_from = table if options.refit else table.where(~held_out)
+    judge = judged.fitted
+    ccp_alpha = judged.ccp_alpha if options.level is None else policy.ccp_alpha
     figures = figures_of(table.where(held_out), judge.at(ccp_alpha), options, policy.psa)
     trained = pruned(policy.fitted, policy.ccp_alpha, learned_from, options)
     whole = convert(trained, options, psa=policy.psa)
@@ -269,6 +252,30 @@ def learn_from(
             *_cautions(table, trained, options),
         ),
     )
+
+
+def _chosen(
+    table: DemonstrationTable, held_out: BoolArray, options: LearnOptions, progress: Progress
+) -> tuple[ChosenPolicy, ChosenPolicy]:
+    """The policy to judge, which knows nothing of the rows held out, and the one to publish."""
+    progress("choosing", _CHOOSING)
+    # Of few rows each one counts, also for what is chosen: it is chosen once more from all.  So it
+    # is where a level is asked for, which is one of the tree that is published.
+    again = options.refit and (len(table) <= _CHOSEN_FROM_ALL or options.level is not None)
+
+    def advance(share: float) -> None:
+        progress("choosing", _CHOOSING + (_JUDGING - _CHOOSING) * share)
+
+    if options.refit and not again:
+        judged = choose(table, options, advance, held_out)
+    else:
+        kept = replace(options, level=None) if again else options
+        judged = choose(table.where(~held_out), kept, advance)
+    progress("judging", _JUDGING)
+    if not options.refit:
+        return judged, judged
+    progress("learning from all rows", _JUDGING)
+    return judged, choose(table, options) if again else _of_all(judged, options)
 
 
 def reaction_time_of(table: DemonstrationTable, options: LearnOptions) -> ReactionTime:

@@ -74,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     defaults = LearnOptions()
     _add_rows(parser, defaults)
     _add_learning(parser, defaults)
+    _add_vocabulary(parser)
     _add_form(parser)
     _add_judging(parser, defaults)
     return parser
@@ -126,6 +127,13 @@ def _add_rows(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
         "and then the executor's rate must be theirs (default: %(default)s)",
     )
     rows.add_argument(
+        "--reaction-time",
+        type=_seconds,
+        metavar="SECONDS|auto",
+        help="how late the demonstrator acted, to be undone before learning; auto: read off the "
+        "demonstrations where rows are samples, else 0 (default: auto)",
+    )
+    rows.add_argument(
         "--upsample",
         type=Upsampling,
         choices=list(Upsampling),
@@ -166,29 +174,6 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
         "those on offer are listed with what each costs",
     )
     learning.add_argument(
-        "--history",
-        type=_history,
-        metavar=f"auto|{_values(History)}",
-        help="what the tree may test of what was done before: the previous action, the last "
-        "action taken of the paper, or nothing; auto: the previous action where that raises mean "
-        "recall in cross-validation (default: auto)",
-    )
-    learning.add_argument(
-        "--differences",
-        type=Use,
-        choices=list(Use),
-        metavar=_values(Use),
-        help="whether the tree may compare two features, as in left < right; auto: where that "
-        "makes it a quarter smaller at the same agreement (default: auto)",
-    )
-    learning.add_argument(
-        "--reaction-time",
-        type=_seconds,
-        metavar="SECONDS|auto",
-        help="how late the demonstrator acted, to be undone before learning; auto: read off the "
-        "demonstrations where rows are samples, else 0 (default: auto)",
-    )
-    learning.add_argument(
         "--delta",
         type=float,
         help="actions with at least (1 - DELTA) of a leaf's largest share may stand together in "
@@ -203,6 +188,26 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
     )
     learning.add_argument(
         "--random-state", type=int, default=defaults.random_state, help="default: %(default)s"
+    )
+
+
+def _add_vocabulary(parser: argparse.ArgumentParser) -> None:
+    learning = parser.add_argument_group("what a tree may test")
+    learning.add_argument(
+        "--history",
+        type=_history,
+        metavar=f"auto|{_values(History)}",
+        help="what the tree may test of what was done before: the previous action, the last "
+        "action taken of the paper, or nothing; auto: the previous action where that raises mean "
+        "recall in cross-validation (default: auto)",
+    )
+    learning.add_argument(
+        "--differences",
+        type=Use,
+        choices=list(Use),
+        metavar=_values(Use),
+        help="whether the tree may compare two features, as in left < right; auto: where that "
+        "makes it a quarter smaller at the same agreement (default: auto)",
     )
 
 
