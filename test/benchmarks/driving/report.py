@@ -65,7 +65,7 @@ def report(measured: Measured) -> str:
     """All tables of a run."""
     parts = [_overall(measured), _by_count(measured), _needed(measured), _by_task(measured)]
     if DEFAULT in measured.methods:
-        parts += [_against_trees(measured), _growth(measured)]
+        parts += [_ahead_by_count(measured), _against_trees(measured), _growth(measured)]
         parts += [_forecast(measured), _lateness(measured)]
     parts += [_refusals(measured)]
     parts += [_of_task(measured, task) for task in measured.tasks]
@@ -106,6 +106,18 @@ def _by_count(measured: Measured) -> str:
     counts = sorted({one.cell.n for one in measured.learned})
     lines = _means(measured.learned, counts, lambda one: one.cell.n)
     title = "Success in per cent over demonstrations, mean over tasks and sets"
+    return _table(title, ["method", *(f"n = {n}" for n in counts)], lines)
+
+
+def _ahead_by_count(measured: Measured) -> str:
+    by_count = grouped(measured.learned, lambda one: one.cell.n)
+    counts = sorted(by_count)
+    lines = []
+    for method in measured.methods:
+        if method != DEFAULT:
+            found = (compare(by_count[n], DEFAULT, method) for n in counts)
+            lines.append([method, *(_points(one.difference) if one else "" for one in found)])
+    title = "By how much the default is ahead over demonstrations, in points, ± standard error"
     return _table(title, ["method", *(f"n = {n}" for n in counts)], lines)
 
 
