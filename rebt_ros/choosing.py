@@ -2,8 +2,9 @@
 
 All is decided in cross-validation, on rows that a tree was not learned from:
 
-- whether the tree may test the previous action, by the mean recall of unpruned trees after their
-  own choices;
+- whether the tree may test the previous action: where that makes the explanation of the rows much
+  simpler, or raises the mean recall of unpruned trees, after their own choices, and makes it no
+  larger (see `FittedTree.explanation`);
 - whether it may test differences of features, by agreement and size;
 - the pruning level, by mean recall: pruning has to pay (see `selection`);
 - PSA nodes, by own-history agreement.
@@ -35,7 +36,7 @@ from rebt_ros.demonstration.table import DemonstrationTable, part_of
 from rebt_ros.errors import OptionError
 from rebt_ros.logic.conditions import Difference
 from rebt_ros.options import LearnOptions, Use
-from rebt_ros.selection import MOST_FOLDS, CrossValidation, JudgedLevels
+from rebt_ros.selection import MOST_FOLDS, CrossValidation, JudgedLevels, clearly_raised
 
 #: With fewer rows the folds are too small to tell anything.
 _FEWEST_ROWS = 20
@@ -43,6 +44,9 @@ _FEWEST_ROWS = 20
 #: Of larger tables, so many rows, by whole demonstrations, tell what a tree may test; the level is
 #: chosen by all.
 _LARGE, _ROWS_THAT_TELL = 6_000, 2_000
+
+#: To which share the previous action has to bring the size of the explanation.
+_MUCH_SIMPLER = 0.8
 
 #: How much agreement differences may cost, and to which share of the leaves they have to come.
 _DEARER, _SMALLER = 0.005, 0.75
@@ -244,15 +248,35 @@ class _Choice:
         asked = self._options.history
         if asked is not None:
             return asked
-        without = self.judged(FEATURES_ALONE, telling=True).unpruned_recall()
-        with_it = self.judged(Vocabulary(History.PREVIOUS), telling=True).unpruned_recall()
-        compared = f"mean recall ({with_it:.1%} after its own choices, {without:.1%} without)"
-        # Sums of the same shares in another order may differ in the last bits.
-        if with_it - without > 1e-9:
-            self.reasons.append(f"Testing the previous action raises {compared}.")
+        with_it = Vocabulary(History.PREVIOUS)
+        before, after = (self._fitted(one).explanation for one in (FEATURES_ALONE, with_it))
+        compared = f"{after} leaves and exceptions explain the rows, {before} without it"
+        if after <= _MUCH_SIMPLER * before:
+            self.reasons.append(f"The previous action is tested: {compared}.")
             return History.PREVIOUS
-        self.reasons.append(f"Testing the previous action does not raise {compared}.")
-        return History.NONE
+        if after > before:
+            self.reasons.append(f"The previous action is not tested: {compared}.")
+            return History.NONE
+        judged = [self.judged(one, telling=True).unpruned() for one in (FEATURES_ALONE, with_it)]
+        raised = clearly_raised(*judged)
+        without, recall = (one.mean_recalls[0] for one in judged)
+        self.reasons.append(
+            f"The previous action is {'tested' if raised else 'not tested'}: {compared}, and mean "
+            f"recall after its own choices is {'' if raised else 'not '}clearly higher "
+            f"({recall:.1%}, {without:.1%} without it)."
+        )
+        return History.PREVIOUS if raised else History.NONE
+
+    def _fitted(self, vocabulary: Vocabulary) -> FittedTree:
+        """Fitted to the rows that tell what a tree may test."""
+        options = self._options
+        return fit(
+            self._telling,
+            vocabulary=vocabulary,
+            max_depth=options.max_depth,
+            random_state=options.random_state,
+            upsample=options.upsample,
+        )
 
     def _differences(self, vocabulary: Vocabulary) -> tuple[Difference, ...]:
         options = self._options

@@ -3,8 +3,8 @@
 delay
     Rows that pass until a decision is acted on: row t's action belongs to the state d rows before.
 explanation
-    A decision tree of actions, with the rows that it gets wrong as exceptions.  Its size is the
-    number of its leaves and exceptions, of the pruned tree for which that is least.
+    A decision tree of actions, with the rows that it gets wrong as exceptions (see
+    `FittedTree.explanation`).
 
 People act 0.1 to 0.5 s late.  At the true delay, actions follow from states by the demonstrator's
 own rules; at any other one, a tree must make up for what happened in between.  So its explanation
@@ -26,7 +26,7 @@ import numpy as np
 
 from rebt_ros.arrays import IntArray
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
-from rebt_ros.decision_tree.training import FittedTree, fit
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.lags import evenly_spaced
 from rebt_ros.demonstration.last_action import NO_ACTION, History, previous_actions
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -291,7 +291,7 @@ class _Explanations:
             before=None,
             previous=table.previous[rows],
         )
-        return _size(fit(late, vocabulary=vocabulary))
+        return fit(late, vocabulary=vocabulary).explanation
 
 
 def _stretches(rows: IntArray) -> IntArray:
@@ -308,20 +308,6 @@ def _usual_run(table: DemonstrationTable) -> float:
     begins = np.flatnonzero(table.previous != table.chosen)
     lengths = np.diff(np.append(begins, len(table)))
     return float(np.sum(lengths**2) / np.sum(lengths)) - 1
-
-
-def _size(fitted: FittedTree) -> int:
-    """Leaves and exceptions of the pruned tree that has the fewest."""
-    tree = fitted.classifier.tree_
-    shares = tree.value[:, 0, :]
-    right = np.max(shares, axis=1) / np.sum(shares, axis=1)
-    sizes = (1 + np.rint(tree.n_node_samples * (1 - right)).astype(np.int64)).tolist()
-    left, other = tree.children_left.tolist(), tree.children_right.tolist()
-    # Children come after their parents.
-    for node in range(tree.node_count - 1, -1, -1):
-        if left[node] >= 0:
-            sizes[node] = min(sizes[node], sizes[left[node]] + sizes[other[node]])
-    return int(sizes[0])
 
 
 def _clear(trials: Sequence[Trial], explained: int) -> int:

@@ -80,7 +80,7 @@ class JudgedLevels:
     @property
     def mean_recalls(self) -> FloatArray:
         """Mean recall of the actions at each level, shape (levels,)."""
-        return np.asarray(self._contributions.sum(axis=0))
+        return np.asarray(self.contributions.sum(axis=0))
 
     @property
     def best(self) -> int:
@@ -91,7 +91,7 @@ class JudgedLevels:
     @property
     def chosen(self) -> int:
         """The largest tree that is not clearly worse than the best."""
-        contributions, best = self._contributions, self.best
+        contributions, best = self.contributions, self.best
         worse = contributions[:, [best]] - contributions
         clearly = _CLEAR * len(worse) * _standard_error(worse)
         return int(np.argmax(np.round(worse.sum(axis=0) - clearly, 12) <= 0))
@@ -101,10 +101,17 @@ class JudgedLevels:
         return max(int(np.searchsorted(self.ccp_alphas, ccp_alpha, side="right")) - 1, 0)
 
     @property
-    def _contributions(self) -> FloatArray:
+    def contributions(self) -> FloatArray:
         """What each fold adds to the mean recall, shape (folds, levels)."""
         shown = self.shown.sum(axis=0)
         return np.asarray(np.mean(self.hits[..., shown > 0] / shown[shown > 0], axis=2))
+
+
+def clearly_raised(before: JudgedLevels, after: JudgedLevels) -> bool:
+    """Whether the first level's mean recall is clearly higher, fold by fold, in the same folds."""
+    gains = after.contributions[:, :1] - before.contributions[:, :1]
+    clearly = _CLEAR * len(gains) * _standard_error(gains)
+    return bool(np.round(gains.sum(axis=0) - clearly, 12)[0] > 0)
 
 
 def _standard_error(values: FloatArray) -> FloatArray:
@@ -201,13 +208,13 @@ class CrossValidation:
         hits = [self._run(place, self._middles[run], choices) for place in range(len(self._folds))]
         return self._judged(self.fitted.path.alphas[run], hits)
 
-    def unpruned_recall(self) -> float:
-        """Mean recall of the folds' unpruned trees, after their own choices."""
+    def unpruned(self) -> JudgedLevels:
+        """The folds' unpruned trees, after their own choices: one level."""
         unpruned = np.zeros(1)
         hits = [
             self._run(place, unpruned, decision_tree_choices) for place in range(len(self._folds))
         ]
-        return float(self._judged(unpruned, hits).mean_recalls[0])
+        return self._judged(unpruned, hits)
 
     def own_history_at(self, ccp_alpha: float, choices: Choices) -> float:
         """Mean own-history agreement of the folds' trees at one level."""

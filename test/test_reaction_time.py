@@ -310,7 +310,7 @@ def test_a_delay_is_taken_where_sizes_have_a_clear_valley(
 ) -> None:
     # Without a delay states with the previous action are asked for, too.
     left = iter([sizes[0], 99, *sizes[1:]])
-    monkeypatch.setattr(reaction_time, "_size", lambda _: next(left))
+    monkeypatch.setattr(FittedTree, "explanation", property(lambda _: next(left)))
     found = estimate(shuttles(0))
     assert found.trials == tuple(Trial(*one) for one in enumerate(sizes))
     assert found.rows == rows

@@ -198,8 +198,8 @@ def _add_vocabulary(parser: argparse.ArgumentParser) -> None:
         type=_history,
         metavar=f"auto|{_values(History)}",
         help="what the tree may test of what was done before: the previous action, the last "
-        "action taken of the paper, or nothing; auto: the previous action where that raises mean "
-        "recall in cross-validation (default: auto)",
+        "action taken of the paper, or nothing; auto: the previous action where it makes the "
+        "rows simpler to explain (default: auto)",
     )
     learning.add_argument(
         "--differences",

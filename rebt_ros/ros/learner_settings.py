@@ -121,7 +121,8 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
         "history",
         "auto",
         "What the tree may test of what was done before: previous (action), last (action taken, as "
-        "in the paper) or none; auto: the previous action where that raises mean recall.",
+        "in the paper) or none; auto: the previous action where it makes the rows simpler to "
+        "explain.",
         choices=("auto", *(kind.value for kind in History)),
         fixed=False,
     )
