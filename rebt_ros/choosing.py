@@ -109,13 +109,8 @@ def choose(
     levels = judged.levels(partial(own_history_choices, options=options, psa=False))
     ccp_alpha, reasons = _asked_for(judged.fitted, options), choice.reasons
     if ccp_alpha is None:
-        ccp_alpha = float(levels.ccp_alphas[levels.chosen])
-        recalls = levels.mean_recalls
-        reasons.append(
-            f"Of {len(recalls)} pruning levels, ccp_alpha = {ccp_alpha:.3g} makes the largest tree "
-            f"whose mean recall ({recalls[levels.chosen]:.1%}) is not clearly below the best "
-            f"({recalls[levels.best]:.1%}; {recalls[0]:.1%} unpruned)."
-        )
+        ccp_alpha, reason = _level(levels, choice.shown)
+        reasons.append(reason)
     psa, reason = _choose_psa(judged, ccp_alpha, options)
     fitted = judged.fitted
     if options.simplest and options.upsample is Upsampling.NONE:
@@ -139,6 +134,24 @@ def _asked_for(fitted: FittedTree, options: LearnOptions) -> float | None:
             "a tree that does one thing whatever happens."
         )
     return float(fitted.path.alphas[options.level])
+
+
+def _level(levels: JudgedLevels, shown: DemonstrationTable) -> tuple[float, str]:
+    """The ``ccp_alpha`` to prune at, and why."""
+    begun = int(np.count_nonzero(shown.previous != shown.chosen))
+    # Stretches of one demonstration may each be a part of the task that no other one shows.
+    if len(np.unique(shown.demonstration)) == 1 and begun < levels.shown.size:
+        return 0.0, (
+            f"One demonstration in which actions are begun {begun} times does not tell how far to "
+            "prune: the tree is not pruned."
+        )
+    recalls, chosen = levels.mean_recalls, levels.chosen
+    ccp_alpha = float(levels.ccp_alphas[chosen])
+    return ccp_alpha, (
+        f"Of {len(recalls)} pruning levels, ccp_alpha = {ccp_alpha:.3g} makes the largest tree "
+        f"whose mean recall ({recalls[chosen]:.1%}) is not clearly below the best "
+        f"({recalls[levels.best]:.1%}; {recalls[0]:.1%} unpruned)."
+    )
 
 
 def _of_another_fit(

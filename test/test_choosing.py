@@ -312,6 +312,20 @@ def test_history_is_tested_where_it_makes_the_explanation_simpler_or_raises_reca
     assert history is (History.PREVIOUS if tested else History.NONE)
 
 
+def test_one_demonstration_in_which_little_happens_is_not_pruned() -> None:
+    policy = choose(shuttling(1, legs=3, steps=16), LearnOptions(history=History.NONE))
+    assert policy.levels is not None
+    assert policy.levels.chosen > 0
+    assert policy.ccp_alpha == 0.0
+    assert "actions are begun 3 times does not tell how far to prune" in " ".join(policy.reasons)
+
+
+def test_several_demonstrations_and_one_in_which_much_happens_tell_how_far_to_prune() -> None:
+    for rows in (shuttling(3, legs=3, steps=16), noisy()):
+        reasons = " ".join(choose(rows, LearnOptions(history=History.NONE)).reasons)
+        assert "pruning levels, ccp_alpha" in reasons
+
+
 def test_a_task_that_needs_memory_gets_the_previous_action() -> None:
     policy = choose(shuttling(), LearnOptions())
     assert policy.fitted.vocabulary.history is History.PREVIOUS

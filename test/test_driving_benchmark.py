@@ -17,7 +17,7 @@ from sklearn.tree import DecisionTreeClassifier
 
 sys.path.append(str(Path(__file__).parent / "benchmarks"))
 
-from driving import tasks
+from driving import shared, tasks
 from driving.__main__ import main
 from driving.cells import Origin, Store
 from driving.corrections import Course, Mode, Stage, taken_over
@@ -142,6 +142,17 @@ def test_what_must_not_be_done_ends_an_episode() -> None:
 def test_an_unknown_task_is_refused_with_the_known_ones() -> None:
     with pytest.raises(OptionError, match="no task 'dance': choose of robot, shuttle"):
         task_named("dance")
+
+
+@pytest.mark.skipif(not shared.is_there(), reason="../shared/closed_loop is not there")
+def test_the_expert_of_a_shared_task_does_it_in_states_of_its_features() -> None:
+    task = _some_task("shared-patrol")
+    assert task.needs_memory
+    states, _ = _expert_run(task, 3)
+    assert task.success
+    assert {len(state) for state in states} == {len(task.features)}
+    with pytest.raises(OptionError, match=r"no task 'shared-dance': choose of .*shared-patrol"):
+        task_named("shared-dance")
 
 
 @given(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), max_size=12))

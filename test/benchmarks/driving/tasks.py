@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from importlib.util import find_spec
 
+from driving import shared
 from driving.task import Task
 from rebt_ros.errors import OptionError
 
@@ -32,6 +33,8 @@ _NEEDED = {
     "lander": ("gymnasium", "Box2D"),
     "grids": ("gymnasium", "minigrid"),
 }
+#: Their tasks are in one file, which imports all of them.
+_NEEDED_BY_SHARED = ("gymnasium", "Box2D", "minigrid")
 
 
 def task_named(name: str) -> Task:
@@ -40,13 +43,15 @@ def task_named(name: str) -> Task:
     Raises:
         OptionError: There is no such task, or it needs a package that is not installed.
     """
-    if name not in _HOMES:
-        raise OptionError(f"there is no task {name!r}: choose of {', '.join(NAMES)}.")
     if missing := missing_for(name):
         raise OptionError(
             f"the task {name!r} needs {' and '.join(missing)}: "
             "pip install 'gymnasium[box2d]' minigrid."
         )
+    if name.startswith(shared.PREFIX):
+        return _shared(name)
+    if name not in _HOMES:
+        raise OptionError(f"there is no task {name!r}: choose of {', '.join(NAMES)}.")
     module, _, kind = _HOMES[name].partition(".")
     task: Task = getattr(importlib.import_module(f"driving.{module}"), kind)()
     return task
@@ -54,5 +59,15 @@ def task_named(name: str) -> Task:
 
 def missing_for(name: str) -> tuple[str, ...]:
     """The packages that a task needs and that are not installed."""
-    module, _, _ = _HOMES[name].partition(".")
+    if name.startswith(shared.PREFIX):
+        return tuple(one for one in _NEEDED_BY_SHARED if find_spec(one) is None)
+    module, _, _ = _HOMES.get(name, "").partition(".")
     return tuple(one for one in _NEEDED.get(module, ()) if find_spec(one) is None)
+
+
+def _shared(name: str) -> Task:
+    if not shared.is_there():
+        raise OptionError(f"the task {name!r} needs ../shared/closed_loop, which is not there.")
+    if name not in shared.names():
+        raise OptionError(f"there is no task {name!r}: choose of {', '.join(shared.names())}.")
+    return shared.shared_task(name)
