@@ -21,20 +21,37 @@ class InstallScripts(install_scripts):
 
     def write_script(self, script_name, contents, mode="t", *ignored):
         """Writes an executable."""
-        interpreter, newline, rest = contents.partition("\n")
+        first, newline, rest = contents.partition("\n")
         blocking = _env_that_blocks() if script_name in NODES else None
-        if blocking and interpreter.startswith("#!/"):
-            interpreter = f"#!{blocking} {interpreter[2:]}"
-        super().write_script(script_name, interpreter + newline + rest, mode, *ignored)
+        super().write_script(script_name, _first_line(first, blocking) + newline + rest, mode)
+
+
+def _first_line(line, blocking):
+    """The first line of an executable, or its first two.
+
+    The kernel knows no quotes, so that where the path of the interpreter has a blank, a shell
+    starts it.  To Python, what the shell reads is a string.
+
+    Args:
+        line: As setuptools writes it.
+        blocking: What starts it with blocked signals, or nothing.
+    """
+    if not line.startswith("#!"):
+        return line
+    interpreter = line.removeprefix("#!").strip()
+    if not interpreter.startswith('"'):
+        return f"#!{blocking[0]} -S {blocking[1]} {interpreter}" if blocking else line
+    start = " ".join([*(blocking or ()), interpreter])
+    return f"#!/bin/sh\n'''exec' {start} \"$0\" \"$@\"\n' '''"
 
 
 def _env_that_blocks():
-    """What to put before an interpreter to start it with blocked signals, if that is possible."""
+    """What starts an interpreter with blocked signals, if that is possible: env and its option."""
     env = shutil.which("env")
     if env is None:
         return None
-    blocking = f"{env} -S --block-signal=INT,TERM"
-    done = subprocess.run([*blocking.split(), "true"], stderr=subprocess.DEVNULL, check=False)
+    blocking = (env, "--block-signal=INT,TERM")
+    done = subprocess.run([*blocking, "true"], stderr=subprocess.DEVNULL, check=False)
     return blocking if done.returncode == 0 else None
 
 
@@ -82,6 +99,7 @@ setup(
             f"generate = {PACKAGE}.commands.generate:main",
             f"learn = {PACKAGE}.commands.learn:main",
             f"replay = {PACKAGE}.commands.replay:main",
+            f"show = {PACKAGE}.commands.show:main",
             f"simulate = {PACKAGE}.commands.simulate:main",
             f"trial = {PACKAGE}.commands.trial:main",
             *(f"{node} = {PACKAGE}.ros.entry:{node}" for node in NODES),

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from rebt_ros import pipeline
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, unmeasurable
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.schema import FeatureKind
@@ -30,10 +31,14 @@ from rebt_ros.pipeline import Learning, Progress
 from rebt_ros.replaying import Replay
 from rebt_ros.replaying import replay as replay_demonstrations
 from rebt_ros.selection import JudgedLevels
+from rebt_ros.storage.account import Account
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.inputs import InputOptions, load
 from rebt_ros.storage.tree_file import read_tree
 from rebt_ros.storage.versions import versions
+
+#: Names that ROS 2 has for topics.
+_TOPIC = re.compile(r"/?(?:[A-Za-z_]\w*/)*[A-Za-z_]\w*", re.ASCII)
 
 #: So many different ones can be actions even where each was shown once or twice.
 _FEW_ACTIONS = 20
@@ -54,10 +59,12 @@ class OfflineLearning:
     """What it was made from, for each channel."""
     notes: tuple[str, ...]
     """What a person should know about the inputs; no full stops."""
+    accounts: Mapping[str, Account] = field(default_factory=dict)
+    """Where what each demonstration's file holds went."""
 
 
 def learn(
-    inputs: Sequence[str | Path],
+    inputs: Sequence[str | Path] | str | Path,
     *,
     out: str | Path | None = None,
     options: LearnOptions | None = None,
@@ -70,7 +77,7 @@ def learn(
     """Learns a behavior tree from bags, recordings and CSV tables.
 
     Args:
-        inputs: Each one or more demonstrations, oldest first.
+        inputs: Each one or more demonstrations, oldest first; or the only one.
         out: Directory to write to: tree.json, summary.json, tree.txt, pictures of the behavior
             tree and of its decision tree.  With several channels the decision trees are in
             channels/NAME/.
@@ -89,27 +96,30 @@ def learn(
     if levels:
         check_most_levels(most_levels)
     progress("reading", 0.0)
-    loaded = load([Path(one) for one in inputs], reading or InputOptions())
+    paths = _paths(inputs)
+    reading = reading or InputOptions()
+    loaded = load(paths, replace(reading, features=reading.features | frozenset(declared or ())))
     tables = tabulate(loaded.demonstrations, declared)
     learning = _part(progress, 0.0, _LEARNING_SHARE) if levels else progress
     for table in tables:
         _refuse_what_are_no_actions(table)
     learnings = pipeline.learn_channels(tables, options, learning)
     further = (note for learning in learnings for note in learning.notes)
-    notes = (*loaded.notes, *further)
-    result = OfflineLearning(pipeline.side_by_side(learnings), learnings, notes)
+    learned = pipeline.side_by_side(learnings)
+    notes = (*loaded.notes, *further, *_not_on_a_robot(learned))
+    result = OfflineLearning(learned, learnings, notes, loaded.accounts)
     if out is not None:
         writing = _part(progress, _LEARNING_SHARE, 1.0)
         missing = _write_trees(Path(out), result, options, most_levels if levels else 0, writing)
         result = replace(result, notes=(*notes, *missing))
-        _write_summary(Path(out), result, [str(one) for one in inputs], options)
+        _write_summary(Path(out), result, [str(one) for one in paths], options)
     progress("done", 1.0)
     return result
 
 
 def replay(
     tree: LearnedTree | str | Path,
-    inputs: Sequence[str | Path],
+    inputs: Sequence[str | Path] | str | Path,
     *,
     reading: InputOptions | None = None,
 ) -> tuple[Replay, ...]:
@@ -117,8 +127,9 @@ def replay(
 
     Args:
         tree: A learned tree, or the file of one.
-        inputs: Each one or more demonstrations.
-        reading: How to read the inputs.
+        inputs: Each one or more demonstrations; or the only one.
+        reading: How to read the inputs.  Label columns of tables need not be named where they are
+            called like the tree's channels.
 
     Returns:
         One for each channel of the tree that was recorded.
@@ -127,8 +138,33 @@ def replay(
         RebtError: The tree or an input cannot be used, or they do not fit each other.
     """
     learned = tree if isinstance(tree, LearnedTree) else read_tree(Path(tree))
-    loaded = load([Path(one) for one in inputs], reading or InputOptions())
-    return replay_demonstrations(learned, loaded.demonstrations)
+    reading = reading or InputOptions()
+    names = frozenset(feature.name for feature in learned.features)
+    reading = replace(reading, features=reading.features | names)
+    policies = tuple(nodes.policies(learned.tree))
+    if len(policies) > 1:
+        reading = replace(reading, channels=reading.channels or policies)
+    return replay_demonstrations(learned, load(_paths(inputs), reading).demonstrations)
+
+
+def _paths(inputs: Sequence[str | Path] | str | Path) -> tuple[Path, ...]:
+    return tuple(map(Path, [inputs] if isinstance(inputs, str | Path) else inputs))
+
+
+def _not_on_a_robot(learned: LearnedTree) -> Iterator[str]:
+    """What keeps the executor from running the tree."""
+    for feature in unmeasurable(learned):
+        yield (
+            f"the tree tests {feature.name!r}, which holds texts ({feature.examples}): "
+            "topics carry numbers, so that the executor refuses this tree; replay and "
+            "rebt_ros.Policy run it"
+        )
+    for channel in nodes.policies(learned.tree):
+        if not _TOPIC.fullmatch(channel):
+            yield (
+                f"{channel!r} is no name of a topic, so that the executor refuses this tree: "
+                "rename the label column, with letters, digits and underscores"
+            )
 
 
 def _refuse_what_are_no_actions(table: DemonstrationTable) -> None:
@@ -172,6 +208,7 @@ def _write_summary(
 ) -> None:
     summary = summarize(result) | {
         "inputs": list(inputs),
+        "accounts": {name: account.as_json() for name, account in result.accounts.items()},
         "notes": list(result.notes),
         "random_state": options.random_state,
         "upsample": options.upsample.value,

@@ -85,6 +85,7 @@ class LearnOptions:
     """What to turn all PSA nodes into; None to leave them to the user."""
 
     def __post_init__(self) -> None:
+        self._take_words()
         if not 0 <= self.delta <= 1:
             raise OptionError(f"delta must lie between 0 and 1, not at {self.delta:g}.")
         if self.max_depth is not None and self.max_depth < 1:
@@ -108,6 +109,21 @@ class LearnOptions:
             raise OptionError(f"random_state must be a 32-bit number, not {self.random_state}.")
         if not 0 <= self.lags <= LARGEST_LAG:
             raise OptionError(f"lags must lie between 0 and {LARGEST_LAG}, not at {self.lags}.")
+
+    def _take_words(self) -> None:
+        """Takes the words of enums, as they stand on the command line, for their members."""
+        for name, kind in _ENUMS.items():
+            value = getattr(self, name)
+            words = [str(member.value) for member in kind]
+            if isinstance(value, str) and value in words:
+                object.__setattr__(self, name, kind(value))
+            elif name in _CHOSEN and (value is None or value == "auto"):
+                object.__setattr__(self, name, None)
+            elif not isinstance(value, kind):
+                known = ", ".join(words)
+                raise OptionError(f"{name} must be one of {known}, not {value!r}.")
+        if isinstance(self.attach, str):
+            object.__setattr__(self, "attach", (self.attach,))
 
     @property
     def is_paper(self) -> bool:
@@ -133,5 +149,17 @@ class LearnOptions:
             routines=False,
         )
 
+
+#: Options that are one of several words.
+_ENUMS: Mapping[str, type[Enum]] = {
+    "psa": Use,
+    "history": History,
+    "differences": Use,
+    "root": Root,
+    "upsample": Upsampling,
+    "psa_choice": PsaChoice,
+}
+#: Those that are None where nobody chose.
+_CHOSEN = frozenset({"history", "psa_choice"})
 
 DEFAULTS = LearnOptions()

@@ -14,7 +14,7 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.lags import with_lags
 from rebt_ros.demonstration.last_action import NO_ACTION
-from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.schema import TRUTH, Feature, FeatureKind, number_of
 from rebt_ros.demonstration.table import DemonstrationTable, category, tabulate
 from rebt_ros.errors import InputError
 from rebt_ros.reaction_time import rows_in, shifted, tells_time
@@ -168,6 +168,13 @@ def _translated(wanted: Feature, recorded: Feature, values: FloatArray) -> Float
             )
         return values
     position = {name: float(place) for place, name in enumerate(wanted.categories)}
+    if recorded.kind is FeatureKind.BINARY and position.keys() <= TRUTH.keys():
+        position = {category(TRUTH[name]): place for name, place in position.items()}
+    elif not recorded.categories and all(number_of(name) is None for name in position):
+        raise InputError(
+            f"the feature {wanted.name!r} is text for the tree ({wanted.examples}), "
+            "but the recording holds numbers."
+        )
     known = ~np.isnan(values)
     translated = np.full(len(values), np.nan)
     translated[known] = [

@@ -41,7 +41,7 @@ LAYERS: Final = (
     {"behavior_tree"},
     {"demonstration"},
     {"logic"},
-    {"errors", "arrays"},
+    {"errors", "arrays", "streams"},
 )
 DEPTH: Final = {unit: depth for depth, units in enumerate(LAYERS) for unit in units}
 
@@ -262,7 +262,9 @@ def test_the_core_runs_where_ros_is_not_installed() -> None:
     _run(f"{WITHOUT_ROS} [importlib.import_module(name) for name in {names}]")
 
 
-@pytest.mark.parametrize("command", ["experiment", "generate", "learn", "replay", "simulate", "trial"])
+@pytest.mark.parametrize(
+    "command", ["experiment", "generate", "learn", "replay", "show", "simulate", "trial"]
+)
 def test_offline_commands_need_no_ros(command: str) -> None:
     _run(f"{WITHOUT_ROS} importlib.import_module('rebt_ros.commands.{command}')")
 

@@ -11,6 +11,7 @@ from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError
+from rebt_ros.storage.account import Account
 from rebt_ros.storage.csv_table import read_csv
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
@@ -55,16 +56,20 @@ def test_an_empty_cell_is_a_missing_value(table):
     assert shown.features[0].kind is FeatureKind.NUMERIC
 
 
-def test_truth_with_gaps_is_categorical_because_a_binary_value_is_never_missing(table):
+def test_truth_with_gaps_is_binary_with_missing_values(table):
     shown = read_csv(table("on,a\nTrue,go\n,turn\nfalse,go\n")).demonstration
-    assert shown.features[0].kind is FeatureKind.CATEGORICAL
-    assert shown.features[0].categories == ("False", "True")
+    assert shown.features[0].kind is FeatureKind.BINARY
     np.testing.assert_array_equal(shown.states[:, 0], [1, np.nan, 0])
 
 
-def test_spellings_of_truth_are_one_category_each(table):
-    shown = read_csv(table("on,a\nTrue,go\n1,turn\n0,go\nFALSE,go\n")).demonstration
-    assert shown.features[0].categories == ("False", "True")
+@pytest.mark.parametrize(
+    "cells",
+    ["True,1,0,FALSE", "yes,Yes,no,NO", "on,ON,off,Off", "y,Y,n,N", "1,true,no,0", "T,t,F,f"],
+)
+def test_spellings_of_truth_are_one_value_each(table, cells):
+    one, two, three, four = cells.split(",")
+    shown = read_csv(table(f"on,a\n{one},go\n{two},turn\n{three},go\n{four},go\n")).demonstration
+    assert shown.features[0].kind is FeatureKind.BINARY
     assert shown.states[:, 0].tolist() == [1, 1, 0, 0]
 
 
@@ -74,11 +79,70 @@ def test_zeros_and_ones_are_numbers(table):
 
 
 def test_a_column_of_numbers_with_one_word_in_it_is_noted(table):
-    read = read_csv(table("x,a\n1,go\n2,go\nn/a,turn\n"))
-    assert read.demonstration.features[0].categories == ("1", "2", "n/a")
+    read = read_csv(table("x,a\n1,go\n2,go\nfar,turn\n"))
+    assert read.demonstration.features[0].categories == ("1", "2", "far")
     assert read.notes == (
-        "column 'x' is taken as text, not as numbers, because line 4 holds 'n/a'",
+        "column 'x' is taken as text, not as numbers, because line 4 holds 'far'",
     )
+
+
+def test_a_few_words_among_many_numbers_are_missing_values_with_a_note(table):
+    rows = "".join(f"{x},go\n" for x in range(40))
+    read = read_csv(table(f"x,a\n{rows}error,turn\n7,turn\nerror,turn\n"))
+    assert read.demonstration.features[0].kind is FeatureKind.NUMERIC
+    assert np.flatnonzero(np.isnan(read.demonstration.states[:, 0])).tolist() == [40, 42]
+    assert read.notes == (
+        "column 'x' is read as numbers: 2 cells hold no number, such as 'error' on line 42, and "
+        "are missing values",
+    )
+
+
+@pytest.mark.parametrize("cell", ["", "NA", "n/a", "NaN", "null", "-", "--", "  "])
+def test_what_says_that_there_is_no_value_is_a_missing_value(table, cell):
+    read = read_csv(
+        table(f"x,where,on,a\n1,hall,yes,go\n{cell},{cell},{cell},turn\n2,,no,{cell}\n")
+    )
+    assert np.isnan(read.demonstration.states[1]).all()
+    assert labels(read.demonstration) == ["go", "turn"]
+    assert read.notes == ("1 of 3 rows have no action and are left out",)
+    assert read.account == Account("rows", 3, 2, 2, {"have no action": 1})
+
+
+def test_a_column_of_texts_that_hardly_recur_is_no_feature(table):
+    rows = "".join(f"note {x},{x % 7},{'go' if x % 2 else 'turn'}\n" for x in range(100))
+    read = read_csv(table(f"comment,x,a\n{rows}"))
+    assert [one.name for one in read.demonstration.features] == ["x"]
+    assert read.notes == (
+        "column 'comment' holds 100 different texts in 100 cells, such as 'note 0', and is no "
+        "feature",
+    )
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        "2026-11-27,2026-11-28",
+        "2026-11-27T19:25:56Z,2026-11-27 19:25:57.5+01:00",
+        "19:25,19:26:07",
+        "27.11.2026,28/11/2026",
+    ],
+)
+def test_dates_and_times_are_no_features(table, cells):
+    first, second = cells.split(",")
+    read = read_csv(table(f"when,x,a\n{first},1,go\n{second},2,turn\n"))
+    assert [one.name for one in read.demonstration.features] == ["x"]
+    assert read.notes == ("column 'when' holds dates or times and is no feature",)
+
+
+@pytest.mark.parametrize("name", ["time", "Timestamp", "index", "Unnamed: 0"])
+def test_columns_that_number_or_date_the_rows_are_features_only_if_asked_for(table, name):
+    text = table(f"{name},x,a\n1.5,1,go\n2.5,2,turn\n")
+    read = read_csv(text)
+    assert [one.name for one in read.demonstration.features] == ["x"]
+    assert read.notes == (f"column {name!r} numbers or dates the rows and is no feature",)
+    asked = read_csv(text, features={name})
+    assert [one.name for one in asked.demonstration.features] == [name, "x"]
+    assert asked.notes == ()
 
 
 @pytest.mark.parametrize("cell", ["1_000", "١"])
@@ -87,7 +151,7 @@ def test_only_what_every_tool_reads_as_a_number_is_one(table, cell):
     assert shown.features[0].categories == (cell,)
 
 
-@pytest.mark.parametrize("cell", ["nan", "inf", "-Infinity", "1e39", "-1e400"])
+@pytest.mark.parametrize("cell", ["inf", "-Infinity", "1e39", "-1e400"])
 def test_a_number_that_is_not_finite_or_too_large_is_refused_with_its_place(table, cell):
     with pytest.raises(InputError, match=rf"line 3: column 'y' holds '{cell}'"):
         read_csv(table(f"x,y,a\n1,2,go\n1,{cell},turn\n"))
@@ -106,9 +170,11 @@ def test_the_label_column_may_stand_anywhere(table):
     assert labels(shown) == ["go", "turn"]
 
 
-def test_a_label_keeps_its_text_exactly(table):
-    text = 'x,a\n1, go \n2,"say ""hi"", twice"\n3,007\n'
-    assert labels(read_csv(table(text)).demonstration) == [" go ", 'say "hi", twice', "007"]
+def test_a_label_keeps_its_text_but_for_blanks_around_it(table):
+    text = 'x,a\n1, go  on \n2,"say ""hi"", twice"\n3,007\n'
+    read = read_csv(table(text))
+    assert labels(read.demonstration) == ["go  on", 'say "hi", twice', "007"]
+    assert read.notes == ("blanks around actions do not count",)
 
 
 def test_an_unknown_label_column_is_refused_with_the_columns_there_are(table):
@@ -239,10 +305,12 @@ def test_a_stamp_column_of_integers_is_the_stamp(table):
     assert shown.demonstration.stamps.tolist() == [1700000000000000001, 1700000000000000002]
 
 
-def test_a_stamp_column_of_other_values_is_a_feature_with_a_note(table):
+def test_a_stamp_column_of_other_values_is_no_feature_either(table):
     read = read_csv(table("stamp,x,a\n0.5,1,go\n0.6,2,go\n"))
-    assert [one.name for one in read.demonstration.features] == ["stamp", "x"]
+    assert [one.name for one in read.demonstration.features] == ["x"]
     assert "does not hold integers" in read.notes[0]
+    asked = read_csv(table("stamp,x,a\n0.5,1,go\n0.6,2,go\n"), features={"stamp"})
+    assert [one.name for one in asked.demonstration.features] == ["stamp", "x"]
 
 
 def test_byte_order_mark_line_ends_and_blank_lines_do_not_matter(table):
@@ -252,8 +320,8 @@ def test_byte_order_mark_line_ends_and_blank_lines_do_not_matter(table):
 
 
 def test_line_numbers_count_line_breaks_inside_cells(table):
-    with pytest.raises(InputError, match="line 5: column 'y' holds 'nan'"):
-        read_csv(table('x,y,a\n"two\nlines",1,go\n\nb,nan,go\n'))
+    with pytest.raises(InputError, match="line 5: column 'y' holds 'inf'"):
+        read_csv(table('x,y,a\n"two\nlines",1,go\n\nb,inf,go\n'))
 
 
 @pytest.mark.parametrize(
@@ -267,7 +335,7 @@ def test_line_numbers_count_line_breaks_inside_cells(table):
         ("x,y,a\n1,2,go\n1,2,3,go\n", "line 3: there are 4 cells where 3 were expected"),
         ("x,x,a\n1,2,go\n", "two columns are named 'x'"),
         (",x,a\n0,2,go\n", "column 1 has no name"),
-        ("x;a\n1;go\n", "single column"),
+        ("x\n1\n", "single column"),
         ("stamp,a\n1,go\n", "no column beside the actions"),
         ('x,a\n1,"go\n', "line 2: this is not CSV"),
         ('x,a\n1,"go\nup"\n', "line 2: the action .* printable"),
@@ -316,7 +384,7 @@ class TestRealData:
         assert read.notes == ("186 of 1000 rows have no action and are left out",)
         assert len(read.demonstration) == 814
         kinds = {one.name: one.kind for one in read.demonstration.features}
-        assert kinds["/ExerciseSubmissionResult"] is FeatureKind.CATEGORICAL
+        assert kinds["/ExerciseSubmissionResult"] is FeatureKind.BINARY
         assert kinds["/IsNewExercise"] is FeatureKind.BINARY
         assert kinds["/KC"] is FeatureKind.NUMERIC
 

@@ -10,7 +10,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.shown import ShownChannel, problems
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import History
-from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.schema import Feature, number_of
 from rebt_ros.logic.conditions import (
     HasCategory,
     Interval,
@@ -145,6 +145,17 @@ class LearnedTree:
             for condition in nodes.conditions(tree):
                 yield from _problems_of(condition, categories, labels)
         yield from problems(self.shown, self.features)
+
+
+def unmeasurable(learned: LearnedTree) -> tuple[Feature, ...]:
+    """The features that the tree tests for a text, which no topic of numbers can carry."""
+    tested = {
+        (condition.feature, condition.category)
+        for node in nodes.conditions(learned.tree)
+        if isinstance(condition := node.literal.condition, HasCategory)
+    }
+    texts = {feature for feature, category in tested if number_of(category) is None}
+    return tuple(feature for feature in learned.features if feature.name in texts)
 
 
 def _problems_of(

@@ -22,7 +22,7 @@ from rebt_ros.behavior_tree.prediction import holds_after
 from rebt_ros.behavior_tree.wording import Wording
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import ActionHistory
-from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.schema import Feature, FeatureKind, number_of
 from rebt_ros.logic.conditions import (
     Condition,
     Difference,
@@ -341,9 +341,9 @@ class StateEncoder:
         ]
         self._codes = [
             {
-                float(name): float(code)
+                number: float(code)
                 for code, name in enumerate(feature.categories)
-                if _number(name)
+                if (number := number_of(name)) is not None
             }
             for feature in features
         ]
@@ -384,11 +384,3 @@ class StateEncoder:
         if not lag:
             return present[place]
         return self._past[lag - 1][place] if lag <= len(self._past) else math.nan
-
-
-def _number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -22,7 +22,7 @@ from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
 from rebt_ros.algorithms.rules import leaf_rules
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import aligned, run
+from rebt_ros.commands.shell import aligned, parse, run
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.decision_tree.tree import DecisionTree, Leaf
@@ -64,7 +64,7 @@ class ConfigurationResult:
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
-    parsed = _parser().parse_args(arguments)
+    parsed = parse(_parser(), arguments)
     run(lambda: _bench(parsed), "bench-reduction")
 
 

@@ -37,7 +37,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import loads
 from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
-from rebt_ros.commands.shell import aligned, run, use_color
+from rebt_ros.commands.shell import aligned, directory, parse, run, use_color
 from rebt_ros.errors import RebtError
 from rebt_ros.simulation.demonstrator import ENOUGH
 from rebt_ros.storage.atomic import write_text_atomically
@@ -75,9 +75,9 @@ def main(arguments: list[str] | None = None) -> None:
         help="runs of each driver to compare (default: %(default)s)",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("demo-results"), help="default: ./%(default)s"
+        "--out", type=directory, default=Path("demo-results"), help="default: ./%(default)s"
     )
-    parsed = parser.parse_args(arguments)
+    parsed = parse(parser, arguments)
     folder = parsed.out / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
     plan = Plan(parsed.demonstrations, parsed.trials, folder.resolve())
     for number in (signal.SIGTERM, signal.SIGHUP):

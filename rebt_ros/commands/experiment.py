@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import aligned, run
+from rebt_ros.commands.shell import aligned, directory, parse, run
 from rebt_ros.experiment.experiment import Chosen, run_experiment
 from rebt_ros.experiment.report import Report, rows_of_table
 from rebt_ros.experiment.settings import Settings
@@ -15,7 +15,7 @@ from rebt_ros.experiment.settings import Settings
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point."""
-    parsed = _parser().parse_args(arguments)
+    parsed = parse(_parser(), arguments)
     run(lambda: _experiment(parsed), "experiment")
 
 
@@ -35,7 +35,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--out",
-        type=Path,
+        type=directory,
         default=Path("experiment-results"),
         metavar="DIR",
         help="for the results and the report (default: %(default)s)",

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import add_seed, run
+from rebt_ros.commands.shell import add_seed, directory, parse, run
 from rebt_ros.errors import OptionError
 from rebt_ros.simulation.experiment_file import format_config
 from rebt_ros.simulation.experiment_generator import generate_configs
@@ -18,7 +18,7 @@ _DRAWN = 0.2
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
-    parsed = _parser().parse_args(arguments)
+    parsed = parse(_parser(), arguments)
     run(lambda: _generate(parsed), "generate")
 
 
@@ -31,7 +31,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("count", type=int, metavar="COUNT", help="how many")
     add_seed(parser)
     parser.add_argument(
-        "--out", type=Path, default=Path("experiments"), metavar="DIR", help="default: %(default)s"
+        "--out",
+        type=directory,
+        default=Path("experiments"),
+        metavar="DIR",
+        help="default: %(default)s",
     )
     return parser
 

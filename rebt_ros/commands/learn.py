@@ -19,7 +19,15 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.choosing import ChosenPolicy
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import add_input_options, aligned, input_options, run, use_color
+from rebt_ros.commands.shell import (
+    add_input_options,
+    aligned,
+    directory,
+    input_options,
+    parse,
+    run,
+    use_color,
+)
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import FeatureKind
@@ -59,7 +67,7 @@ _ASKED = (
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
-    parsed = _parser().parse_args(arguments)
+    parsed = parse(_parser(), arguments)
     run(lambda: _learn(parsed), "learn")
 
 
@@ -82,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_output(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--out", type=Path, default=Path("learned"), metavar="DIR", help="default: %(default)s"
+        "--out", type=directory, default=Path("learned"), metavar="DIR", help="default: %(default)s"
     )
     parser.add_argument(
         "--levels",

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rebt_ros import offline
-from rebt_ros.commands.shell import add_input_options, aligned, input_options, run
+from rebt_ros.commands.shell import add_input_options, aligned, input_options, parse, run
 from rebt_ros.replaying import Disagreement, Replay
 
 #: Recordings whose rows lie closer have no clock, as CSV tables (seconds).
@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> None:
         metavar="N",
         help="how many disagreements to list (default: %(default)s)",
     )
-    parsed = parser.parse_args(arguments)
+    parsed = parse(parser, arguments)
     run(lambda: _replay(parsed), "replay")
 
 

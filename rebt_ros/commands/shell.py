@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from rebt_ros import streams
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.errors import RebtError
@@ -17,19 +18,43 @@ from rebt_ros.storage.inputs import InputOptions
 _FAILED, _INTERRUPTED = 1, 130
 
 
+def parse(
+    parser: argparse.ArgumentParser, arguments: Sequence[str] | None = None
+) -> argparse.Namespace:
+    """What the command line says; to be called first of all."""
+    streams.prepare()
+    return parser.parse_args(arguments)
+
+
 def run(command: Callable[[], None], name: str) -> None:
     """Runs a command; a `RebtError` becomes one sentence and exit code 1."""
     try:
         command()
         sys.stdout.flush()
     except RebtError as error:
-        print(f"{name}: {error}", file=sys.stderr)
-        sys.exit(_FAILED)
+        _fail(f"{name}: {error}")
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)
     except BrokenPipeError:
-        # The reader, such as `head`, has seen enough; nothing may be flushed to it at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader, such as `head`, has seen enough.
+        streams.drop(sys.stdout)
+    except OSError as error:
+        if error.filename is not None:
+            _fail(f"{name}: {error.filename} cannot be used ({error.strerror}).")
+        streams.drop(sys.stdout)
+        _fail(f"{name}: the output cannot be written ({error.strerror or error}).")
+
+
+def _fail(sentence: str) -> None:
+    print(sentence, file=sys.stderr)
+    sys.exit(_FAILED)
+
+
+def directory(text: str) -> Path:
+    """The type of an option that names a directory to write to."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("a directory needs a name: name one, or leave it out")
+    return Path(text)
 
 
 def use_color() -> bool:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import add_seed, aligned, run
+from rebt_ros.commands.shell import add_seed, aligned, directory, parse, run
 from rebt_ros.errors import InputError
 from rebt_ros.simulation.experiment_config import ExperimentConfig, parse_config
 from rebt_ros.simulation.experiment_robot import (
@@ -36,7 +36,7 @@ _TABLE, _BAG, _SUMMARY = "table.csv", "bag", "summary.json"
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
-    parsed = _parser().parse_args(arguments)
+    parsed = parse(_parser(), arguments)
     run(lambda: _simulate(parsed), "simulate")
 
 
@@ -72,7 +72,11 @@ def _parser() -> argparse.ArgumentParser:
         help="how often Repeaters run their children (default: %(default)s)",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("simulated"), metavar="DIR", help="default: %(default)s"
+        "--out",
+        type=directory,
+        default=Path("simulated"),
+        metavar="DIR",
+        help="default: %(default)s",
     )
     parser.add_argument(
         "--bag",

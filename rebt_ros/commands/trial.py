@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from rebt_ros.commands.asking import AskingJudge
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import aligned, run
+from rebt_ros.commands.shell import aligned, parse, run
 from rebt_ros.errors import OptionError
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.trial.candidates import Candidate, distinct, of_files, of_levels
@@ -35,7 +35,7 @@ _SHOWN = 30
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     own, of_ros = _split(sys.argv[1:] if arguments is None else arguments)
-    parsed = _parser().parse_args(own)
+    parsed = parse(_parser(), own)
     if parsed.levels is None and not parsed.trees:
         _parser().error("name a TREE, or a directory with --levels")
     for number in (signal.SIGTERM, signal.SIGHUP):

@@ -20,6 +20,9 @@ from enum import Enum
 #: How many rows a feature may look back.
 LARGEST_LAG = 20
 
+#: How many categories a message lists.
+_LISTED = 3
+
 
 class FeatureKind(Enum):
     """How a feature is tested."""
@@ -27,6 +30,10 @@ class FeatureKind(Enum):
     NUMERIC = "numeric"
     BINARY = "binary"
     CATEGORICAL = "categorical"
+
+
+#: Categories that are truth values, by the number that a topic carries for them.
+TRUTH = {"False": 0.0, "True": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +57,12 @@ class Feature:
     lag: int = 0
     """How many rows before it had this value; topic and index are those of its source."""
 
+    @property
+    def examples(self) -> str:
+        """The first categories, in words."""
+        more = ", …" if len(self.categories) > _LISTED else ""
+        return ", ".join(self.categories[:_LISTED]) + more
+
     def __post_init__(self) -> None:
         if (self.kind is FeatureKind.CATEGORICAL) != bool(self.categories):
             raise ValueError(f"{self.name!r} is {self.kind.value} with {self.categories}")
@@ -61,3 +74,13 @@ class Feature:
             raise ValueError(f"{self.name!r} needs both a topic and an index, or neither")
         if self.topic is not None and self.index is None:
             raise ValueError(f"{self.name!r} has a topic without an index")
+
+
+def number_of(category: str) -> float | None:
+    """The number that a topic carries for a category; None where none does."""
+    if category in TRUTH:
+        return TRUTH[category]
+    try:
+        return float(category)
+    except ValueError:
+        return None

@@ -11,11 +11,8 @@ import numpy as np
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.demonstration.last_action import NO_ACTION, last_actions, previous_actions
-from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.schema import TRUTH, Feature, FeatureKind
 from rebt_ros.errors import InputError, OptionError
-
-#: Categories of truth values that are sometimes missing, in the order of 0 and 1.
-_TRUTH = ("False", "True")
 
 #: Rows that are looked at before all of them are.
 _FIRST_ROWS = 1000
@@ -253,7 +250,9 @@ def _joined_states(
                 f"{first.name} and {other.name} have different features "
                 f"({', '.join(differing[:3])}): learn from demonstrations of one robot and set-up."
             )
-    features = tuple(map(_unified, *(one.features for one in demonstrations)))
+    features = tuple(
+        _unified(*_telling(place, demonstrations)) for place in range(len(first.features))
+    )
     states = np.concatenate([one.states for one in demonstrations])
     end = 0
     for one in demonstrations:
@@ -264,15 +263,23 @@ def _joined_states(
     return features, states
 
 
+def _telling(place: int, demonstrations: Sequence[Demonstration]) -> tuple[Feature, ...]:
+    """A feature as the demonstrations have it in which it ever has a value; at least one."""
+    found = [
+        one.features[place] for one in demonstrations if not np.isnan(one.states[:, place]).all()
+    ]
+    return tuple(found or (demonstrations[0].features[place],))
+
+
 def _unified(first: Feature, *others: Feature) -> Feature:
     """One feature that holds the values of the same feature in several demonstrations."""
     kinds = {one.kind for one in (first, *others)}
     if FeatureKind.CATEGORICAL not in kinds:
         return first if kinds == {first.kind} else replace(first, kind=FeatureKind.NUMERIC)
     categories = {name for one in (first, *others) for name in one.categories}
-    if kinds == {FeatureKind.BINARY, FeatureKind.CATEGORICAL} and categories <= {*_TRUTH}:
+    if kinds == {FeatureKind.BINARY, FeatureKind.CATEGORICAL} and categories <= TRUTH.keys():
         # The same truth values, with gaps in one of the demonstrations.
-        return replace(first, kind=FeatureKind.CATEGORICAL, categories=_TRUTH)
+        return replace(first, kind=FeatureKind.CATEGORICAL, categories=tuple(TRUTH))
     if kinds != {FeatureKind.CATEGORICAL}:
         raise InputError(
             f"feature {first.name!r} holds text in one demonstration and numbers in another: "

@@ -42,6 +42,7 @@ class ActionResults:
     def report(self, text: str) -> bool:
         """Takes a result, "success" or "failure", led by "label:" where it names its action.
 
+        Capitals do not matter.
         Results that come while nothing runs, or for an action that does not run any longer, have
         no effect.
 
@@ -49,7 +50,7 @@ class ActionResults:
             Whether the text is a result at all.
         """
         label, _, word = text.rpartition(":")
-        result = _RESULTS.get(word.strip())
+        result = _RESULTS.get(word.strip().lower())
         if self._running is not None and label.strip() in ("", self._running.label):
             self._result = result or self._result
         return result is not None

@@ -12,6 +12,8 @@ import os
 import signal
 import sys
 
+from rebt_ros import streams
+
 STOP_SIGNALS = frozenset({signal.SIGINT, signal.SIGTERM})
 """What ends a node, in order and with exit code 0."""
 
@@ -52,6 +54,7 @@ def _run(node: str) -> None:
     for one in STOP_SIGNALS:
         signal.signal(one, _leave)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
+    streams.prepare()
     try:
         importlib.import_module(f"rebt_ros.ros.{node}_node").main()
     finally:

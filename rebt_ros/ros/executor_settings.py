@@ -8,7 +8,7 @@ from pathlib import Path
 from rclpy.node import Node
 
 from rebt_ros.ros.novelty_guard import Novelty
-from rebt_ros.ros.parameters import Parameters, nanoseconds
+from rebt_ros.ros.parameters import Parameters, at_home, nanoseconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ def declare_settings(node: Node) -> ExecutorSettings:
         choices=("timer", "state"),
     )()
     return ExecutorSettings(
-        tree_file=Path(tree_file).expanduser() if tree_file else None,
+        tree_file=at_home("tree_file", tree_file) if tree_file else None,
         rate=rate,
         tick_on_state=tick_on == "state",
         state_timeout=nanoseconds(state_timeout),

@@ -6,6 +6,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import rclpy
 from rclpy.exceptions import (
@@ -28,7 +29,7 @@ from rclpy.signals import (
     install_signal_handlers,
     uninstall_signal_handlers,
 )
-from rclpy.utilities import ok, try_shutdown
+from rclpy.utilities import ok, remove_ros_args, try_shutdown
 
 from rebt_ros.errors import RebtError
 from rebt_ros.ros.entry import STOP_SIGNALS
@@ -61,6 +62,7 @@ def run(factory: Callable[[], Node], args: list[str] | None = None, *, threads: 
             sentence on standard error says why.
     """
     with _noted_signals() as stopped:
+        _answer_other_arguments(sys.argv if args is None else args)
         try:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         except Exception as err:
@@ -70,6 +72,26 @@ def run(factory: Callable[[], Node], args: list[str] | None = None, *, threads: 
                 _live(factory, threads, stopped)
         finally:
             try_shutdown()
+
+
+def _answer_other_arguments(args: list[str]) -> None:
+    """Answers what is not for ROS: a call for help, or what nobody understands."""
+    try:
+        program, *others = remove_ros_args(args) or ["node"]
+    except Exception:
+        # What is wrong with those for ROS is told where they are used.
+        return
+    name = Path(program).name
+    usage = (
+        f"{name} [--ros-args [-p PARAMETER:=VALUE]… [--params-file FILE] [-r FROM:=TO]…]; "
+        f"'ros2 param describe /{name} PARAMETER' tells what a parameter means, and so does "
+        f"config/{name}.yaml"
+    )
+    if {"-h", "--help"} & set(others):
+        print(f"usage: {usage}.")
+        raise SystemExit(0)
+    if others:
+        _give_up(f"the argument {others[0]!r} is not understood; usage: {usage}.", None)
 
 
 def _live(factory: Callable[[], Node], threads: int, stopped: Callable[[], bool]) -> None:
@@ -137,7 +159,7 @@ def _noted_signals() -> Iterator[Callable[[], bool]]:
             signal.signal(one, handler)
 
 
-def _give_up(sentence: str, err: Exception) -> None:
+def _give_up(sentence: str, err: Exception | None) -> None:
     get_logger("rebt_ros").fatal(" ".join(sentence.split()))
     sys.stderr.flush()
     raise SystemExit(1) from err

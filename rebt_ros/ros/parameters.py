@@ -16,7 +16,11 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.exceptions import (
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+    ParameterUninitializedException,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -96,7 +100,7 @@ class Parameters:
         """A list of texts.  Empty ones do not count: ROS 2 cannot write down an empty list."""
         descriptor = _descriptor(description, fixed)
         read = self._declare(name, list(default) or [""], descriptor)
-        return lambda: tuple(one for one in read() if one)
+        return lambda: tuple(one for one in read() or () if one)
 
     def directory(
         self, name: str, default: str, description: str, *, fixed: bool = True
@@ -111,13 +115,7 @@ class Parameters:
         def path() -> Path:
             if not read():
                 raise OptionError(f"parameter {name!r} is empty: give it a directory.")
-            try:
-                return Path(read()).expanduser()
-            except RuntimeError as err:
-                raise OptionError(
-                    f"parameter {name!r} is {read()!r}, but there is no such home: "
-                    "write out the directory."
-                ) from err
+            return at_home(name, read())
 
         path()
         return path
@@ -135,7 +133,16 @@ class Parameters:
                 f"parameter {name!r} must be {_allowed(descriptor)}, "
                 f"not {self._started_with(name)!r}."
             ) from err
-        return lambda: cast(T, self._node.get_parameter(name).value)
+        # A list that is given as [] has no type to ROS 2, and the parameter then has no value.
+        if not isinstance(default, list) and self._value(name) is None:
+            raise OptionError(f"parameter {name!r} must be {_TYPES[type(default)]}, not empty.")
+        return lambda: cast(T, self._value(name))
+
+    def _value(self, name: str) -> Any:
+        try:
+            return self._node.get_parameter(name).value
+        except ParameterUninitializedException:
+            return None
 
     def _started_with(self, name: str) -> Any:
         # rclpy has no public way to see a value that it refused.
@@ -150,6 +157,20 @@ class Parameters:
                     reason=f"{one.name} must be one of {', '.join(choices)}, not {one.value!r}",
                 )
         return SetParametersResult(successful=True)
+
+
+def at_home(parameter: str, path: str) -> Path:
+    """A path in which ``~`` is the user's home.
+
+    Raises:
+        OptionError: There is no such home.
+    """
+    try:
+        return Path(path).expanduser()
+    except RuntimeError as err:
+        raise OptionError(
+            f"parameter {parameter!r} is {path!r}, but there is no such home: write out the path."
+        ) from err
 
 
 def _descriptor(description: str, fixed: bool) -> ParameterDescriptor:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final
 
 from rclpy.duration import Duration
@@ -14,7 +13,7 @@ from std_srvs.srv import SetBool
 from rebt_ros.demonstration.fields import dimension_labels_of
 from rebt_ros.errors import OptionError
 from rebt_ros.ros import lifetime
-from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.parameters import Parameters, at_home
 from rebt_ros.simulation.experiment_config import parse_config
 from rebt_ros.simulation.experiment_robot import (
     REPEATS,
@@ -73,7 +72,7 @@ class SyntheticRobotNode(Node):
         if not path:
             raise OptionError("parameter 'config' is empty: give it a configuration file.")
 
-        file = Path(path).expanduser()
+        file = at_home("config", path)
         config = parse_config(read_text(file), file.stem)
         for note in config.notes:
             self.get_logger().warning(f"{note}.")

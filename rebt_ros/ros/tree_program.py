@@ -12,7 +12,7 @@ from rclpy.validate_topic_name import validate_topic_name
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import loads
 from rebt_ros.behavior_tree.fingerprint import fingerprint
-from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, unmeasurable
 from rebt_ros.behavior_tree.novelty import NoveltyDetector
 from rebt_ros.behavior_tree.runtime import Commander, TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
@@ -81,6 +81,7 @@ class Preparation:
             DocumentError: It cannot be run here.
         """
         _check_channels(learned)
+        _check_measurable(learned)
         topic = self._settings.state_topic
         inputs = TreeInputs(learned, topic, self._settings.state_timeout)
         for one in inputs.topics:
@@ -118,6 +119,14 @@ def _check_channels(learned: LearnedTree) -> None:
     channels = channels_of(learned)
     for channel in channels:
         topic_of("command", channel, channels)
+
+
+def _check_measurable(learned: LearnedTree) -> None:
+    for feature in unmeasurable(learned):
+        raise DocumentError(
+            f"the tree tests {feature.name!r} for texts ({feature.examples}), which "
+            "no state topic can carry: learn from numbers, such as 0, 1 and 2."
+        )
 
 
 def _refusal_or(make: Callable[[], TreeProgram]) -> TreeProgram | DocumentError:

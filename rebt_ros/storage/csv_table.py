@@ -1,8 +1,7 @@
 """CSV tables as demonstrations: one table is one demonstration, one row is one action.
 
-A column is numeric where all its cells are numbers, binary where they all say true or false, and
-categorical otherwise.  An empty cell is a missing value.  Where several columns hold actions, a
-row is one event on each of their channels.
+What the cells of a column mean is told in `cells`.  Where several columns hold actions, a row is
+one event on each of their channels.
 """
 
 from __future__ import annotations
@@ -24,13 +23,27 @@ from rebt_ros.demonstration.demonstration import (
     RowKind,
     in_sorted_order,
 )
-from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError
+from rebt_ros.storage.account import Account
+from rebt_ros.storage.cells import (
+    NoFeature,
+    codes,
+    column,
+    is_missing,
+    is_number,
+    numbers,
+)
+from rebt_ros.storage.dialect import Dialect, dialect_of
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.text import read_text
 
 #: A column of this name holds each row's stamp, in nanoseconds, and is not a feature.
 STAMP = "stamp"
+
+#: Columns of these names, in any case, number or date the rows, and are features only if they are
+#: asked for.
+_NUMBERING = frozenset({STAMP, "time", "timestamp", "index", "unnamed: 0"})
 
 #: A column of the label column's name and this says how each action ended: "success" or "failure".
 #: It is no feature, because it is known only afterwards.
@@ -46,30 +59,37 @@ def read_csv(
     labels: Sequence[str] = (),
     header: bool = True,
     row_kind: RowKind | None = None,
+    features: Set[str] = frozenset(),
+    channels: Sequence[str] = (),
 ) -> Read:
     """Reads a CSV table.
 
     Args:
-        path: The file: UTF-8, comma separated, one line of column names unless `header` says no.
+        path: The file: UTF-8 or UTF-16; cells are separated by commas, or else by semicolons, tabs
+            or bars; one line of column names unless `header` says no.
         labels: Columns that hold the actions; without a header their names (`x24`) or indices
             (`24`); by default the last column.
         header: Whether the first line names the columns (`x0`, `x1`, ... if not).  A first line
             that holds data all the same is recognised by its numbers and noted.
         row_kind: What a row is; None: an event where a column says how actions ended, else a
             sample.
+        features: Columns that are features even where their names say that they number or date the
+            rows.
+        channels: Label columns of a table that has all of them, where `labels` names none.
 
     Returns:
         The rows that have an action: on the channel `DEFAULT_CHANNEL` where there is one label
         column; where there are several, each is a channel of its own, named after the column, and
         a row of the table is one row on each channel that has an action there.  Stamps are those
         of the column `stamp` if it holds integers, else each row's position in the file.  Columns
-        that say how the actions ended (`OUTCOME_SUFFIX`) are left out.
+        that say how the actions ended (`OUTCOME_SUFFIX`), or that number or date the rows, are left
+        out.
 
     Raises:
         InputError: The file cannot be read or is not such a table.
     """
     notes: list[str] = []
-    table = _open(path, labels, header, notes)
+    table = _open(path, labels or channels, header, notes, optional=not labels)
     labelled = _labelled(table, notes)
     cells = tuple(zip(*(table.rows[row] for row in labelled), strict=True))
     shown = _Shown(table, labelled, cells)
@@ -79,36 +99,66 @@ def read_csv(
         row_kind = RowKind.EVENT if left_out else RowKind.SAMPLE
     if stamps is not None:
         left_out.add(STAMP)
-    features, columns = _states(shown, left_out, notes)
+    left_out |= _numbering(table, left_out, features, notes)
+    read, columns = _states(shown, left_out, notes)
     taken, label = shown.events()
     actions, chosen = shown.actions(taken, label)
-    channels, channel = in_sorted_order(table.channels, label)
+    on_channels, channel = in_sorted_order(table.channels, label)
+    unlabelled = len(table.rows) - len(labelled)
     return Read(
         Demonstration(
             path.name,
-            features,
+            read,
             columns[taken],
             (np.array(labelled, dtype=np.int64) if stamps is None else stamps)[taken],
             actions,
             chosen,
-            channels,
+            on_channels,
             channel,
             row_kind=row_kind,
         ),
         tuple(notes),
+        Account(
+            "rows",
+            len(table.rows),
+            len(labelled),
+            len(taken),
+            {"have no action": unlabelled} if unlabelled else {},
+        ),
     )
 
 
-def _open(path: Path, labels: Sequence[str], header: bool, notes: list[str]) -> _Table:
-    """The cells of a file, once it is clear whether its first line names the columns."""
-    file = _File(path, read_text(path))
+def _open(
+    path: Path, labels: Sequence[str], header: bool, notes: list[str], *, optional: bool
+) -> _Table:
+    """The cells of a file, once it is clear whether its first line names the columns.
+
+    Args:
+        path: The file.
+        labels: Columns that hold the actions.
+        header: Whether the first line is said to name the columns.
+        notes: Where to note what was found.
+        optional: Whether the label columns count only if all of them are there.
+    """
+    text = read_text(path)
+    dialect = dialect_of(text)
+    notes += dialect.notes
+    file = _File(path, text, dialect)
     records = _records(file)
+    if optional and not set(labels) <= {cell.strip() for cell in records[0]}:
+        labels = ()
     if header and _first_is_data(records, labels):
         header = False
         notes.append("the first line holds data, so the columns are named x0, x1, and so on")
     table = _table(file, records, labels, header)
     if not header:
         _refuse_header(table)
+    if any(
+        table.rows[row][one] != table.rows[row][one].strip()
+        for one in table.labels
+        for row in range(len(table.rows))
+    ):
+        notes.append("blanks around actions do not count")
     return table
 
 
@@ -117,33 +167,60 @@ def _states(
 ) -> tuple[tuple[Feature, ...], FloatArray]:
     """The features, and their values in each row (rows x features)."""
     table = shown.table
-    read = [
-        shown.feature(index, notes)
+    found = [
+        one
         for index, name in enumerate(table.columns)
         if index not in table.labels and name not in left_out
+        if (one := shown.feature(index, notes)) is not None
     ]
-    if not read:
+    if not found:
         raise InputError(
-            f"{table.file.path} has no column beside the actions: add one per value of the state, "
-            "separated by commas."
+            f"{table.file.path} has no column beside the actions that can be a feature: add one "
+            "per value of the state, separated by commas."
         )
-    return tuple(feature for feature, _ in read), np.column_stack([values for _, values in read])
+    return tuple(feature for feature, _ in found), np.column_stack([values for _, values in found])
+
+
+def _numbering(table: _Table, known: Set[str], asked_for: Set[str], notes: list[str]) -> set[str]:
+    """The columns that number or date the rows, but for those that are known or asked for."""
+    found = {
+        name
+        for index, name in enumerate(table.columns)
+        if name.lower() in _NUMBERING and index not in table.labels
+        if name not in known and name not in asked_for
+    }
+    for name in sorted(found):
+        integers = (
+            ", and does not hold integers (nanoseconds), which could tell the time"
+            if name == STAMP
+            else ""
+        )
+        notes.append(f"column {name!r} numbers or dates the rows and is no feature{integers}")
+    return found
 
 
 @dataclass(frozen=True, slots=True)
 class _File:
     path: Path
     text: str
+    dialect: Dialect
 
     def records(self) -> Iterator[tuple[int, list[str]]]:
         """The line on which each record begins, and its cells; blank lines are left out."""
-        reader = csv.reader(io.StringIO(self.text, newline=""), strict=True)
-        line = 1
+        text = io.StringIO(self.text, newline="")
+        text.seek(self.dialect.begin)
+        reader = csv.reader(
+            text,
+            delimiter=self.dialect.delimiter,
+            skipinitialspace=True,
+            strict=True,
+        )
+        line = before = 1 + self.text.count("\n", 0, self.dialect.begin)
         try:
             for cells in reader:
-                if cells:
+                if any(map(str.strip, cells)):
                     yield line, cells
-                line = reader.line_num + 1
+                line = before + reader.line_num
         except csv.Error as err:
             raise InputError(
                 f"{self.path}, line {line}: this is not CSV ({err}): check its quotes."
@@ -186,7 +263,9 @@ class _Shown:
 
     def events(self) -> tuple[IntArray, IntArray]:
         """Where each action stands, row by row: positions in `rows` and in `table.labels`."""
-        filled = [[bool(cell.strip()) for cell in self.cells[one]] for one in self.table.labels]
+        filled = [
+            [not is_missing(cell.strip()) for cell in self.cells[one]] for one in self.table.labels
+        ]
         taken, label = np.nonzero(np.array(filled).T)
         return taken.astype(np.int64), label.astype(np.int64)
 
@@ -194,7 +273,8 @@ class _Shown:
         """The actions that stand there, sorted, and the position of each event's one."""
         columns = [self.cells[one] for one in self.table.labels]
         cells = [
-            columns[column][row] for row, column in zip(taken.tolist(), label.tolist(), strict=True)
+            columns[one][row].strip()
+            for row, one in zip(taken.tolist(), label.tolist(), strict=True)
         ]
         actions = tuple(dict.fromkeys(cells))
         for action in actions:
@@ -204,7 +284,7 @@ class _Shown:
                     f"{self.table.file.path}, line {self.table.line(row)}: the action "
                     f"{action!r} must consist of printable characters."
                 )
-        return in_sorted_order(actions, _codes(actions, cells))
+        return in_sorted_order(actions, codes(actions, cells))
 
     def stamps(self, notes: list[str]) -> IntArray | None:
         """The stamp column; None where there is none."""
@@ -217,81 +297,27 @@ class _Shown:
         try:
             return np.array([int(cell) for cell in cells], dtype=np.int64)
         except (ValueError, OverflowError):
-            notes.append(
-                f"column {STAMP!r} does not hold integers (nanoseconds) and is taken as a feature"
-            )
             return None
 
-    def feature(self, column: int, notes: list[str]) -> tuple[Feature, FloatArray]:
-        name = self.table.columns[column]
-        cells = self.cells[column]
-        numbers = _numbers(cells)
-        if numbers is None:
-            cells = [cell.strip() for cell in cells]
-            numbers = _numbers(cells)
-        if numbers is not None:
-            self._check_numbers(name, cells, numbers)
-            if np.isnan(numbers).all():
-                notes.append(f"column {name!r} is empty")
-            return Feature(name), numbers
-        words = {cell.lower() for cell in set(cells)}
-        if words <= {"true", "false"}:
-            return Feature(name, FeatureKind.BINARY), np.array(
-                [cell.lower() == "true" for cell in cells], dtype=np.float64
-            )
-        if words <= {"true", "false", "0", "1", ""}:
-            # However it is spelt, it is one value.
-            cells = [_TRUTH[cell.lower()] for cell in cells]
-        categories = sorted(set(cells) - {""})
-        if any(map(_is_number, categories)):
-            text = next(category for category in categories if not _is_number(category))
-            notes.append(
-                f"column {name!r} is taken as text, not as numbers, "
-                f"because line {self._line(cells, text)} holds {text!r}"
-            )
-        values = _codes(("", *categories), cells).astype(np.float64) - 1
-        values[values < 0] = np.nan
-        return Feature(name, FeatureKind.CATEGORICAL, tuple(categories)), values
+    def feature(self, place: int, notes: list[str]) -> tuple[Feature, FloatArray] | None:
+        """A feature with its values; None, with a note, where a column is none."""
+        name, cells = self.table.columns[place], self.cells[place]
+        read = column(name, cells, lambda row: self.table.line(self.rows[row]))
+        if isinstance(read, NoFeature):
+            notes.append(read.note)
+            return None
+        notes += read.notes
+        self._check_numbers(name, cells, read.values)
+        return read.feature, read.values
 
-    def _check_numbers(self, name: str, cells: Sequence[str], numbers: FloatArray) -> None:
-        filled = np.fromiter(map(bool, cells), bool, len(cells))
-        wrong = np.flatnonzero(filled & ~(np.abs(numbers) <= LARGEST_VALUE))
+    def _check_numbers(self, name: str, cells: Sequence[str], values: FloatArray) -> None:
+        wrong = np.flatnonzero(np.abs(values) > LARGEST_VALUE)
         if len(wrong):
             raise InputError(
                 f"{self.table.file.path}, line {self.table.line(self.rows[wrong[0]])}: "
                 f"column {name!r} holds {cells[wrong[0]]!r}: numbers must lie within "
                 f"±{LARGEST_VALUE:g}, and a cell without a value must be empty."
             )
-
-    def _line(self, cells: Sequence[str], cell: str) -> int:
-        """Where a cell first stands."""
-        return self.table.line(self.rows[cells.index(cell)])
-
-
-#: Spellings of truth, as categories.
-_TRUTH = {"true": "True", "1": "True", "false": "False", "0": "False", "": ""}
-
-
-def _codes(labels: Sequence[str], cells: Sequence[str]) -> IntArray:
-    code = {label: index for index, label in enumerate(labels)}
-    return np.fromiter(map(code.__getitem__, cells), np.int64, len(cells))
-
-
-def _numbers(cells: Sequence[str]) -> FloatArray | None:
-    """A column as numbers, NaN where a cell is empty; None where a cell holds something else."""
-    text = "".join(cells)
-    # Python also reads 1_000 and digits of other scripts, which no other tool would.
-    if not text.isascii() or "_" in text:
-        return None
-    filled = cells if all(cells) else [cell or "nan" for cell in cells]
-    try:
-        return np.fromiter(map(float, filled), np.float64, len(cells))
-    except ValueError:
-        return None
-
-
-def _is_number(cell: str) -> bool:
-    return bool(cell) and _numbers((cell,)) is not None
 
 
 def _table(file: _File, records: list[list[str]], labels: Sequence[str], header: bool) -> _Table:
@@ -329,7 +355,7 @@ def _labelled(table: _Table, notes: list[str]) -> list[int]:
     count = len(table.rows)
     for label in table.labels:
         name = table.columns[label]
-        empty = sum(not cells[label].strip() for cells in table.rows)
+        empty = sum(is_missing(cells[label].strip()) for cells in table.rows)
         if empty == count:
             raise InputError(
                 f"{table.file.path}: column {name!r} holds no action: name the column that does."
@@ -346,7 +372,7 @@ def _labelled(table: _Table, notes: list[str]) -> list[int]:
     return [
         row
         for row, cells in enumerate(table.rows)
-        if any(cells[label].strip() for label in table.labels)
+        if not all(is_missing(cells[label].strip()) for label in table.labels)
     ]
 
 
@@ -382,7 +408,7 @@ def _label_position(columns: Sequence[str], label: str, header: bool) -> int | N
 
 
 def _first_is_data(records: Sequence[Sequence[str]], labels: Sequence[str]) -> bool:
-    """Whether the first record, which should name the columns, holds a row's numbers."""
+    """Whether the first record, which should name the columns, holds a row."""
     first = [cell.strip() for cell in records[0]]
     if any(label.strip() in first for label in labels):
         return False
@@ -390,18 +416,26 @@ def _first_is_data(records: Sequence[Sequence[str]], labels: Sequence[str]) -> b
     found = (_label_position(names, label, header=False) for label in labels)
     positions = {position for position in found if position is not None} or {len(first) - 1}
     others = [index for index in range(len(first)) if index not in positions]
-    cells = [first[index] for index in others]
-    if not cells or not all(map(_is_number, cells)):
+    named = [index for index in others if not is_number(first[index])]
+    if len(named) == len(others) or any(_holds_numbers(records, index) for index in named):
         return False
+    if any(_recurs(records, index) for index in (*positions, *named)):
+        return True
     # Tables of unnamed columns are often written with their indices as names.
-    counted = cells == [str(index) for index in others]
-    recurs = any(
-        record[position].strip() == first[position]
-        for record in records[1:]
-        for position in positions
-        if position < len(record)
-    )
-    return recurs or not counted
+    return any(first[index] != str(index) for index in others if index not in named)
+
+
+def _recurs(records: Sequence[Sequence[str]], index: int) -> bool:
+    """Whether what stands first in a column stands there once more."""
+    first = records[0][index].strip()
+    return any(index < len(record) and record[index].strip() == first for record in records[1:])
+
+
+def _holds_numbers(records: Sequence[Sequence[str]], index: int) -> bool:
+    """Whether a column holds numbers below its first cell."""
+    below = [record[index].strip() for record in records[1:] if index < len(record)]
+    found = numbers(below)
+    return found is not None and not np.isnan(found).all()
 
 
 def _refuse_header(table: _Table) -> None:
@@ -410,11 +444,10 @@ def _refuse_header(table: _Table) -> None:
         return
     features = [index for index in range(len(table.columns)) if index not in table.labels]
     first = [table.rows[0][index].strip() for index in features]
-    if not features or any(not cell or _is_number(cell) for cell in first):
+    if not features or any(not cell or is_number(cell) for cell in first):
         return
     for index, name in zip(features, first, strict=True):
-        numbers = _numbers([row[index].strip() for row in table.rows[1:]])
-        if numbers is not None and not np.isnan(numbers).all():
+        if _holds_numbers(table.rows, index):
             raise InputError(
                 f"{table.file.path}: the first line says {name!r} above a column of numbers: "
                 "it names the columns, so read the table with a header."
@@ -426,6 +459,9 @@ def _records(file: _File) -> list[list[str]]:
     records = [cells for _, cells in file.records()]
     if not records:
         raise InputError(f"{file.path} is empty: name a table with rows.")
+    if all(len(cells) == len(records[0]) and not cells[-1].strip() for cells in records):
+        # Some programs end each line with a separator.
+        records = [cells[:-1] for cells in records]
     if len(records[0]) < 2:
         raise InputError(
             f"{file.path} has a single column: a table needs at least one value of the state and "

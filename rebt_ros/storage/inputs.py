@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.errors import InputError, OptionError
+from rebt_ros.storage.account import Account
 from rebt_ros.storage.bag import METADATA, STORAGE_SUFFIXES, read_bag
 from rebt_ros.storage.csv_table import read_csv
 from rebt_ros.storage.read import Read
@@ -26,6 +27,10 @@ class InputOptions:
     header: bool = True
     """For CSV tables."""
     row_kind: RowKind | None = None
+    """For CSV tables."""
+    features: frozenset[str] = frozenset()
+    """For CSV tables."""
+    channels: tuple[str, ...] = ()
     """For CSV tables."""
     state_topics: tuple[StateTopic, ...] = ()
     """For bags."""
@@ -44,6 +49,8 @@ class Loaded:
     demonstrations: tuple[Demonstration, ...]
     notes: tuple[str, ...]
     """What a person should know, each led by the name of its demonstration."""
+    accounts: Mapping[str, Account] = field(default_factory=dict)
+    """Where what each demonstration's file holds went."""
 
 
 class InputKind(Enum):
@@ -78,7 +85,12 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     reads = [_READERS[kind](path, options) for path, kind in sources]
     return Loaded(
         tuple(read.demonstration for read in reads),
-        tuple(f"{read.demonstration.name}: {note}" for read in reads for note in read.notes),
+        tuple(
+            f"{read.demonstration.name}: {note}"
+            for read in reads
+            for note in (*read.notes, *(read.account.notes() if read.account else ()))
+        ),
+        {read.demonstration.name: read.account for read in reads if read.account},
     )
 
 
@@ -132,7 +144,14 @@ def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
 
 
 def _table(path: Path, options: InputOptions) -> Read:
-    return read_csv(path, labels=options.labels, header=options.header, row_kind=options.row_kind)
+    return read_csv(
+        path,
+        labels=options.labels,
+        header=options.header,
+        row_kind=options.row_kind,
+        features=options.features,
+        channels=options.channels,
+    )
 
 
 def _recording(path: Path, _: InputOptions) -> Read:

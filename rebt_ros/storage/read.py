@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.storage.account import Account
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,3 +15,5 @@ class Read:
     demonstration: Demonstration
     notes: tuple[str, ...] = ()
     """What a person should know about it, such as how many rows were left out; no full stops."""
+    account: Account | None = None
+    """Where what it holds went."""

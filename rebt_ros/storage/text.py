@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import codecs
 from pathlib import Path
 
 from rebt_ros.errors import InputError
 
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+
 
 def read_text(path: Path) -> str:
-    """The text of a UTF-8 file, with or without a byte order mark, line ends untouched.
+    """The text of a UTF-8 file, or of a UTF-16 one with a byte order mark, line ends untouched.
 
     Raises:
         InputError: There is no such file, or it cannot be read as text.
@@ -20,7 +23,7 @@ def read_text(path: Path) -> str:
     except ValueError as err:
         raise InputError(f"{str(path)!r} is no name of a file: check it.") from err
     try:
-        text = data.decode("utf-8-sig")
+        text = data.decode("utf-16" if data.startswith(_UTF_16) else "utf-8-sig")
     except UnicodeDecodeError as err:
         line = data.count(b"\n", 0, err.start) + 1
         raise InputError(f"{path}, line {line}: this is not UTF-8 text: save it as UTF-8.") from err

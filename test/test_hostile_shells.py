@@ -1,0 +1,167 @@
+"""Commands and nodes where the terminal, the home or the paths are not what one expects."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+ROWS = "".join(
+    f"{x / 10},{'no' if x % 3 else 'yes'},{'go' if x < 20 else 'turn'}\n" for x in range(40)
+)
+COMMANDS = ("demo", "experiment", "generate", "learn", "replay", "show", "simulate", "trial")
+NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    # The action is one that no narrow encoding knows.
+    path = tmp_path / "table.csv"
+    path.write_text(f"front,docked,action\n{ROWS}".replace("turn", "dreh … ≤"), encoding="utf-8")
+    return path
+
+
+def _run(
+    command: str, *arguments: object, shell: str = "", **variables: str | None
+) -> subprocess.CompletedProcess[str]:
+    environment = dict(os.environ, PYTHONPATH=str(CHECKOUT)) | {
+        name: value for name, value in variables.items() if value is not None
+    }
+    for name in [name for name, value in variables.items() if value is None]:
+        environment.pop(name, None)
+    start = [sys.executable, "-m", f"rebt_ros.commands.{command}", *map(str, arguments)]
+    if shell:
+        start = ["sh", "-c", f'exec "$@" {shell}', "sh", *start]
+    return subprocess.run(
+        start,
+        env=environment,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=300,
+        check=False,
+    )
+
+
+ENCODINGS: list[dict[str, str | None]] = [
+    {"PYTHONIOENCODING": "ascii"},
+    {"PYTHONIOENCODING": "latin-1"},
+    {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
+    {"HOME": None},
+]
+
+
+@pytest.mark.parametrize("environment", ENCODINGS, ids=str)
+def test_learn_replay_and_show_write_what_the_terminal_can_show(
+    environment: dict[str, str | None], table: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    tree = out / "tree.json"
+    for done in (
+        _run("learn", table, "--out", out, **environment),
+        _run("replay", tree, table, **environment),
+        _run("show", tree, **environment),
+    ):
+        assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
+        assert done.stdout
+    assert "dreh … ≤" in (out / "tree.txt").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("environment", ENCODINGS, ids=str)
+def test_every_command_has_help_for_every_terminal(
+    command: str, environment: dict[str, str | None]
+) -> None:
+    done = _run(command, "--help", **environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "usage" in done.stdout
+
+
+@pytest.mark.parametrize("command", ["learn", "replay", "show"])
+def test_a_command_whose_output_is_closed_does_its_work(
+    command: str, table: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    assert _run("learn", table, "--out", out).returncode == 0
+    inputs = {"learn": (table, "--out", out), "replay": (out / "tree.json", table)}
+    arguments = inputs.get(command, (out / "tree.json",))
+    for shell in (">&-", ">&- 2>&-"):
+        done = _run(command, *arguments, shell=shell)
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
+@pytest.mark.parametrize("command", ["learn", "replay", "show"])
+def test_a_command_whose_output_is_full_says_so(command: str, table: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert _run("learn", table, "--out", out).returncode == 0
+    inputs = {"learn": (table, "--out", out), "replay": (out / "tree.json", table)}
+    done = _run(command, *inputs.get(command, (out / "tree.json",)), shell=">/dev/full")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == (
+        f"{command}: the output cannot be written (No space left on device)."
+    )
+    assert "Traceback" not in done.stderr
+
+
+def test_a_link_to_an_input_is_the_input(table: Path, tmp_path: Path) -> None:
+    link = tmp_path / "a link with blanks, # and %.csv"
+    link.symlink_to(table)
+    done = _run("learn", link, "--out", tmp_path / "ä # % out")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "ä # % out" / "tree.json").is_file()
+
+
+@pytest.mark.parametrize("out", ["", "  "])
+def test_a_directory_without_a_name_is_refused(out: str, table: Path) -> None:
+    done = _run("learn", table, "--out", out)
+    assert done.returncode == 2
+    assert "a directory needs a name" in done.stderr
+
+
+def test_a_file_in_place_of_the_directory_is_named(table: Path) -> None:
+    done = _run("learn", table, "--out", table)
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert str(table) in done.stderr
+
+
+def test_show_writes_each_kind_of_file_and_refuses_others(table: Path, tmp_path: Path) -> None:
+    assert _run("learn", table, "--out", tmp_path).returncode == 0
+    tree = tmp_path / "tree.json"
+    for suffix, begins in ((".svg", "<?xml"), (".DOT", "digraph"), (".txt", "      ")):
+        path = tmp_path / f"shown{suffix}"
+        done = _run("show", tree, "--out", path)
+        assert done.returncode == 0, done.stderr
+        assert path.read_text(encoding="utf-8").startswith(begins)
+    done = _run("show", tree, "--out", tmp_path / "shown.gif")
+    assert done.returncode == 1
+    assert "ends in .svg, .png, .dot, .txt" in done.stderr
+    done = _run("show", table)
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+
+
+def _node(node: str, *arguments: str, shell: str = "") -> subprocess.CompletedProcess[str]:
+    start = [sys.executable, "-m", "rebt_ros.ros.entry", node, *arguments]
+    if shell:
+        start = ["sh", "-c", f'exec "$@" {shell}', "sh", *start]
+    environment = dict(os.environ, PYTHONPATH=str(CHECKOUT), PYTHONIOENCODING="ascii")
+    return subprocess.run(
+        start, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_every_node_answers_a_call_for_help_and_what_it_does_not_understand(node: str) -> None:
+    done = _node(node, "--help")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"usage: {node} [--ros-args")
+    done = _node(node, "rate:=5")
+    assert done.returncode == 1
+    assert "the argument 'rate:=5' is not understood" in done.stderr + done.stdout
+    assert "Traceback" not in done.stderr
