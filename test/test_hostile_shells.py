@@ -133,7 +133,7 @@ def test_a_file_in_place_of_the_directory_is_named(table: Path) -> None:
 def test_show_writes_each_kind_of_file_and_refuses_others(table: Path, tmp_path: Path) -> None:
     assert _run("learn", table, "--out", tmp_path).returncode == 0
     tree = tmp_path / "tree.json"
-    for suffix, begins in ((".svg", "<?xml"), (".DOT", "digraph"), (".txt", "      ")):
+    for suffix, begins in ((".svg", "<?xml"), (".DOT", "digraph"), (".txt", "[o] Selector")):
         path = tmp_path / f"shown{suffix}"
         done = _run("show", tree, "--out", path)
         assert done.returncode == 0, done.stderr

@@ -3,30 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 
-def fields_of(dimension_labels: Sequence[str], count: int) -> tuple[str, ...]:
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """A dimension in the layout of an array message."""
+
+    label: str
+    size: int = 1
+
+
+def fields_of(dimensions: Sequence[Dimension], count: int) -> tuple[str, ...]:
     """The field names in the layout of an array message.
 
     Args:
-        dimension_labels: Labels of the layout's dimensions, in order.
+        dimensions: Those of the layout, in order.
         count: How many values the message has.
 
     Returns:
-        One name per value, all different: the labels where there is one per value, or the parts of
-        a single label that lists them with commas; empty where the labels are neither.
+        One name per value, all different: the labels where there is one dimension of size 1 (or 0)
+        per value, or the parts of a single label that lists them with commas; empty where the
+        labels are neither, as those of a matrix.
 
-    >>> fields_of(["front,left,right"], 3)
+    >>> fields_of([Dimension("front,left,right", 3)], 3)
     ('front', 'left', 'right')
-    >>> fields_of(["front", "left"], 2)
+    >>> fields_of([Dimension("front"), Dimension("left")], 2)
     ('front', 'left')
-    >>> fields_of(["rows", "columns"], 6)
+    >>> fields_of([Dimension("rows", 1), Dimension("columns", 2)], 2)
     ()
     """
-    if len(dimension_labels) == count:
-        names = list(dimension_labels)
-    elif len(dimension_labels) == 1:
-        names = dimension_labels[0].split(",")
+    if len(dimensions) == 1:
+        names = [dimensions[0].label] if count == 1 else dimensions[0].label.split(",")
+    elif len(dimensions) == count and all(one.size <= 1 for one in dimensions):
+        names = [one.label for one in dimensions]
     else:
         return ()
     fields = tuple(name.strip() for name in names)

@@ -6,8 +6,8 @@ from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool
 
-from rebt_ros.demonstration.fields import fields_of
 from rebt_ros.ros import lifetime
+from rebt_ros.ros.arrays import names_of, values_of
 from rebt_ros.ros.diagnostics import Faults
 from rebt_ros.ros.parameters import Parameters
 from rebt_ros.simulation.demonstrator import decide
@@ -33,15 +33,15 @@ class DemonstratorNode(Node):
     def _on_state(self, message: Float64MultiArray) -> None:
         if not self._enabled:
             return
-        fields = fields_of([one.label for one in message.layout.dim], len(message.data))
+        fields, values = names_of(message), values_of(message)
         if fields != State._fields:
             self._faults.note(
                 "foreign state",
-                f"a state of {len(message.data)} values is left out: "
+                f"a state of {len(values)} values is left out: "
                 f"its layout must name {', '.join(State._fields)}.",
             )
             return
-        self._actions.publish(String(data=decide(message.data)))
+        self._actions.publish(String(data=decide(values)))
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         self._enabled = request.data

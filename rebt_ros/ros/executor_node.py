@@ -25,6 +25,7 @@ from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError
 from rebt_ros.ros import lifetime
+from rebt_ros.ros.arrays import values_of
 from rebt_ros.ros.background import Background
 from rebt_ros.ros.command_channels import DRIVING_QOS, CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
@@ -231,7 +232,7 @@ class ExecutorNode(Node):
         # A message may still come on a topic that no tree reads any longer.
         if topic not in self._subscriptions_by_topic:
             return
-        self._latest[topic] = Message(message.data, self._now())
+        self._latest[topic] = Message(values_of(message), self._now())
         self._accept(topic)
         self._try_candidate()
         if self._settings.tick_on_state:

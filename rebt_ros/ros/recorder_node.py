@@ -18,10 +18,10 @@ from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
-from rebt_ros.demonstration.fields import fields_of
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
 from rebt_ros.ros import lifetime
+from rebt_ros.ros.arrays import names_of, values_of
 from rebt_ros.ros.arrival import LAST, ArrivalOrder
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
@@ -235,9 +235,9 @@ class RecorderNode(Node):
         if sent is not None:
             self._streams.take(topic, sent, time.monotonic_ns())
         place = received_at(info) if sent is None else sent
-        labels = fields_of([one.label for one in message.layout.dim], len(message.data))
+        values, labels = values_of(message), names_of(message)
         stamp = self._stamp(place)
-        self._queue(place, partial(self._session.observe, stamp, topic, message.data, labels, sent))
+        self._queue(place, partial(self._session.observe, stamp, topic, values, labels, sent))
 
     def _on_action(self, topic: str, message: String, info: dict[str, Any]) -> None:
         self._note(topic, info)

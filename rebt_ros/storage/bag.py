@@ -1,4 +1,4 @@
-"""rosbag2 recordings as demonstrations (the only module that imports rosbags).
+"""rosbag2 recordings as demonstrations.
 
 The messages of a bag go through the same `DemonstrationBuilder` as those that the live recorder
 receives, so that the same messages give the same rows.
@@ -6,36 +6,32 @@ receives, so that the same messages give the same rows.
 
 from __future__ import annotations
 
-import contextlib
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from operator import itemgetter
 from pathlib import Path
 from struct import Struct
-from textwrap import shorten
 from typing import Protocol, cast
 
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from rebt_ros.arrays import FloatArray
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, Fault, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
-from rebt_ros.demonstration.fields import fields_of
-from rebt_ros.errors import InputError, RebtError
-from rebt_ros.storage.bag_safety import check_bag, check_expansion, expansion, guarded_databases
+from rebt_ros.demonstration.fields import Dimension, fields_of
+from rebt_ros.errors import InputError
+from rebt_ros.storage.account import Account
+from rebt_ros.storage.bag_files import BagFiles, Topic, explained, opened_bag
+from rebt_ros.storage.bag_safety import check_expansion, expansion
+from rebt_ros.storage.packing import ZSTD_MAGIC, unzstd
 from rebt_ros.storage.read import Read
-from rebt_ros.storage.text import unreadable
 
 STATE_TYPE = "std_msgs/msg/Float64MultiArray"
 ACTION_TYPE = "std_msgs/msg/String"
 
-#: Names of the files that hold a bag's messages.
-STORAGE_SUFFIXES = (".mcap", ".db3")
-METADATA = "metadata.yaml"
+#: Later than any clock tells (nanoseconds): stamps are signed 64-bit numbers.
+_LATEST = 2**63
 
 
 def read_bag(
@@ -49,7 +45,7 @@ def read_bag(
     """Reads a bag.
 
     Args:
-        path: A bag's directory, or a single .mcap or .db3 file.
+        path: A bag's directory, or a single .mcap or .db3 file, packed with zstd or not.
         state_topics: Topics of the state, with or without their leading slash; by default the
             only one of type std_msgs/msg/Float64MultiArray.
         action_topics: Topics of the actions; by default the only one of type std_msgs/msg/String.
@@ -65,9 +61,9 @@ def read_bag(
         InputError: The bag cannot be read, lacks the topics or holds unusable messages.
         OptionError: A topic is named twice, or the sample rate is not positive.
     """
-    with _opened(path) as reader:
-        kinds = _topics(path, reader)
-        if not kinds:
+    with opened_bag(path) as bag:
+        kinds = _topics(bag)
+        if not any(kinds.values()):
             raise InputError(f"{path} holds no messages: record state and action topics first.")
         names = [one.name for one in state_topics]
         states = _chosen(path, kinds, names, STATE_TYPE, "state")
@@ -78,11 +74,9 @@ def read_bag(
             else [StateTopic(name) for name in states]
         )
         builder = DemonstrationBuilder(topics, actions, sample_rate)
-        wanted = [one for one in reader.connections if one.topic in {*states, *actions}]
+        wanted = {*((one, STATE_TYPE) for one in states), *((one, ACTION_TYPE) for one in actions)}
         feed = _Feed(path, builder, skip_bad)
-        rows = (
-            row for message in _messages(path, reader, wanted) for row in feed.rows_of(*message)
-        )
+        rows = (row for message in _messages(path, bag, wanted) for row in feed.rows_of(*message))
         first = next(rows, None)
         if first is None or builder.features is None:
             raise InputError(f"{path} gives no rows: {feed.why_no_rows(states, actions)}.")
@@ -92,7 +86,8 @@ def read_bag(
             chain((first,), rows),
             RowKind.EVENT if sample_rate is None else RowKind.SAMPLE,
         )
-    return Read(demonstration, feed.notes())
+        stated = sum(bag.stated.get(topic, bag.found[topic]) for topic in wanted)
+    return Read(demonstration, (*bag.notes, *feed.notes()), feed.account(stated, demonstration))
 
 
 @dataclass(slots=True)
@@ -110,40 +105,60 @@ class _Feed:
     bad: list[str] = field(default_factory=list)
     """What was wrong with the messages that were left out."""
 
-    def rows_of(self, connection: Connection, stamp: int, data: bytes) -> tuple[Row, ...]:
-        topic = connection.topic
-        self.seen[topic] += 1
+    def rows_of(self, topic: Topic, stamp: int, data: bytes) -> tuple[Row, ...]:
+        name, kind = topic
+        self.seen[name] += 1
         try:
-            return self._pushed(connection, stamp, data)
+            return self._pushed(topic, stamp, data)
         except BadMessageError as err:
             if err.fault is Fault.NO_STATE:
                 self.early += 1
                 return ()
-            problem = InputError(f"{self.path}, message {self.seen[topic]} on {topic!r}: {err}")
+            problem = InputError(f"{self.path}, message {self.seen[name]} on {name!r}: {err}")
             problem.__cause__ = err
         except _UndecodableError as err:
             problem = InputError(
-                f"{self.path}, message {self.seen[topic]} on {topic!r} cannot be decoded as "
-                f"{connection.msgtype}: record the topic again."
+                f"{self.path}, message {self.seen[name]} on {name!r} cannot be decoded as "
+                f"{kind}: record the topic again."
             )
             problem.__cause__ = err
+        except _LateError:
+            problem = InputError(
+                f"{self.path}, message {self.seen[name]} on {name!r} has the time {stamp} "
+                "(nanoseconds), which no clock tells: leave it out (--skip-bad), or record again."
+            )
         if not self.skip_bad:
             raise problem
         self.bad.append(str(problem))
         return ()
 
-    def _pushed(self, connection: Connection, stamp: int, data: bytes) -> tuple[Row, ...]:
+    def _pushed(self, topic: Topic, stamp: int, data: bytes) -> tuple[Row, ...]:
         """The rows that a message completes.
 
         Raises:
             BadMessageError: The builder refuses it.
             _UndecodableError: It cannot be decoded.
+            _LateError: Its stamp is too large.
         """
-        if connection.msgtype == ACTION_TYPE:
+        name, kind = topic
+        if stamp >= _LATEST:
+            raise _LateError
+        data = _unpacked(data)
+        if kind == ACTION_TYPE:
             message = cast(_String, _decoded(data, ACTION_TYPE))
-            return self.builder.act(stamp, connection.topic, message.data)
+            return self.builder.act(stamp, name, message.data)
         values, labels = self.states.read(data)
-        return self.builder.observe(stamp, connection.topic, values, labels)
+        return self.builder.observe(stamp, name, values, labels)
+
+    def account(self, stated: int, demonstration: Demonstration) -> Account:
+        left_out = {"came before the first state": self.early, "cannot be used": len(self.bad)}
+        return Account(
+            "messages",
+            stated,
+            self.seen.total() - self.early - len(self.bad),
+            len(demonstration),
+            {reason: count for reason, count in left_out.items() if count},
+        )
 
     def notes(self) -> tuple[str, ...]:
         notes = []
@@ -176,12 +191,18 @@ class _UndecodableError(Exception):
     """The bytes of a message are not one of its type."""
 
 
+class _LateError(Exception):
+    """The stamp of a message is later than any clock tells."""
+
+
 class _Dimension(Protocol):
     label: str
+    size: int
 
 
 class _Layout(Protocol):
     dim: Sequence[_Dimension]
+    data_offset: int
 
 
 class _Float64MultiArray(Protocol):
@@ -238,9 +259,11 @@ class _States:
         if head is not None and data.startswith(head.data):
             return head.numbers.unpack_from(data, len(head.data)), head.labels
         message = cast(_Float64MultiArray, _decoded(data, STATE_TYPE))
-        labels = fields_of([dimension.label for dimension in message.layout.dim], len(message.data))
-        self._remember(data, message.data, labels)
-        return tuple(message.data.tolist()), labels
+        values = message.data[message.layout.data_offset :]
+        dimensions = [Dimension(one.label, one.size) for one in message.layout.dim]
+        labels = fields_of(dimensions, len(values))
+        self._remember(data, values, labels)
+        return tuple(values.tolist()), labels
 
     def _remember(self, data: bytes, values: FloatArray, labels: tuple[str, ...]) -> None:
         numbers = Struct(f"<{len(values)}d")
@@ -250,110 +273,30 @@ class _States:
             self._heads[len(data)] = _Head(head, numbers, labels)
 
 
-@contextlib.contextmanager
-def _opened(path: Path) -> Iterator[Reader]:
-    with _explained(path), guarded_databases():
-        reader = Reader(path)
-        check_bag(path, METADATA)
-        reader.open()
+def _unpacked(data: bytes) -> bytes:
+    """A message without the compression of single messages; no message begins like that."""
+    if not data.startswith(ZSTD_MAGIC):
+        return data
+    check_expansion(Path("a message"), expansion(data), len(data))
     try:
-        yield reader
-    finally:
-        reader.close()
+        return unzstd(data)
+    except Exception as err:
+        raise _UndecodableError(str(err)) from err
 
 
-def _messages(
-    path: Path, reader: Reader, wanted: Sequence[Connection]
-) -> Iterator[tuple[Connection, int, bytes]]:
-    """The messages by the time at which they were recorded, those of one instant as they stand."""
-    with _explained(path):
-        messages = _unpacked_in_bounds(path, reader, wanted)
-        # Files are read one after the other, each in the order of time, and where the recorder went
-        # from one to the next their times may overlap.
-        several = path.is_dir() and len(list(filter(_holds_messages, path.iterdir()))) > 1
-        yield from sorted(messages, key=itemgetter(1)) if several else messages
+def _messages(path: Path, bag: BagFiles, wanted: set[Topic]) -> Iterator[tuple[Topic, int, bytes]]:
+    with explained(path):
+        yield from bag.messages(wanted)
 
 
-def _holds_messages(path: Path) -> bool:
-    """Whether it is a file of a bag's messages, compressed or not."""
-    return any(suffix in STORAGE_SUFFIXES for suffix in path.suffixes)
-
-
-def _unpacked_in_bounds(
-    path: Path, reader: Reader, wanted: Sequence[Connection]
-) -> Iterator[tuple[Connection, int, bytes]]:
-    """The messages as rosbags has them; those of too much compressed data are refused."""
-    if reader.compression_mode == "message":
-        storages = cast(_Directory, reader.storage).storages
-        storages[:] = [_BoundedStorage(path, one) for one in storages]
-    yield from reader.messages(wanted)
-
-
-class _Storage(Protocol):
-    connections: list[Connection]
-
-    def messages(
-        self, connections: Collection[Connection], start: int | None, stop: int | None
-    ) -> Iterator[tuple[Connection, int, bytes]]: ...
-
-
-class _Directory(Protocol):
-    storages: list[_Storage]
-
-
-class _BoundedStorage:
-    """A file of compressed messages whose sizes are looked at before they are unpacked."""
-
-    def __init__(self, path: Path, storage: _Storage) -> None:
-        self._path = path
-        self._storage = storage
-        self.connections = storage.connections
-
-    def messages(
-        self, connections: Collection[Connection], start: int | None, stop: int | None
-    ) -> Iterator[tuple[Connection, int, bytes]]:
-        unpacked = size = 0
-        for connection, stamp, data in self._storage.messages(connections, start, stop):
-            unpacked += expansion(data)
-            size += len(data)
-            check_expansion(self._path, unpacked, size)
-            yield connection, stamp, data
-
-
-@contextlib.contextmanager
-def _explained(path: Path) -> Iterator[None]:
-    """Turns whatever a reader of damaged files may raise into one sentence."""
-    try:
-        yield
-    except RebtError:
-        raise
-    except Exception as err:  # of struct, apsw, zstd, YAML, ...: whatever the bytes provoke
-        raise _explanation(path, err) from err
-
-
-def _explanation(path: Path, err: Exception) -> InputError:
-    if not path.exists() or isinstance(err, PermissionError):
-        return unreadable(path, err if isinstance(err, OSError) else FileNotFoundError())
-    if path.is_dir() and not (path / METADATA).exists():
-        if any(one.suffix in STORAGE_SUFFIXES for one in path.iterdir()):
-            return InputError(f"{path} has no {METADATA}: run `ros2 bag reindex {path}` first.")
-        return InputError(f"{path} is not a bag: name a directory that `ros2 bag record` wrote.")
-    reason = shorten(str(err), 200).rstrip(".") or type(err).__name__
-    directory = path if path.is_dir() else path.parent
-    return InputError(
-        f"{path} is truncated, damaged or not a bag ({reason}): "
-        f"try `ros2 bag reindex {directory}`, or record it again."
-    )
-
-
-def _topics(path: Path, reader: Reader) -> dict[str, str]:
-    """Type of each topic that has messages; empty where its publishers differ."""
-    for one in reader.connections:
-        if not isinstance(one.topic, str) or not isinstance(one.msgtype, str):
-            raise InputError(f"{path} has a topic or type that is no text: record it again.")
-    with _explained(path):
-        topics = sorted(reader.topics.items())
-    return {name: info.msgtype or "" for name, info in topics if info.msgcount}
+def _topics(bag: BagFiles) -> dict[str, str]:
+    """Type of each topic that has messages, or their encoding; empty where types differ."""
+    kinds: dict[str, str] = {name: f"{encoding} messages" for name, encoding in bag.others.items()}
+    several = Counter(name for (name, _), count in bag.found.items() if count)
+    for (name, kind), count in sorted(bag.found.items()):
+        if count:
+            kinds[name] = kind if several[name] == 1 else ""
+    return kinds
 
 
 def _chosen(

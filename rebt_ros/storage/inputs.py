@@ -11,10 +11,12 @@ from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.storage.account import Account
-from rebt_ros.storage.bag import METADATA, STORAGE_SUFFIXES, read_bag
+from rebt_ros.storage.bag import read_bag
+from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
+from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.csv_table import read_csv
 from rebt_ros.storage.read import Read
-from rebt_ros.storage.recording import is_recording, read_recording, recordings
+from rebt_ros.storage.recording import RECORDED, is_recording, read_recording, recordings
 from rebt_ros.storage.text import unreadable
 
 
@@ -53,6 +55,10 @@ class Loaded:
     """Where what each demonstration's file holds went."""
 
 
+#: Suffixes of tables in a directory, in lower case.
+_TABLES = frozenset({".csv", ".tsv", ".txt"})
+
+
 class InputKind(Enum):
     """What a file, or a directory that is one demonstration, is."""
 
@@ -65,8 +71,8 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     """Reads demonstrations.
 
     Args:
-        inputs: Bags (directories, .mcap or .db3 files), recordings, directories of recordings,
-            and CSV tables.
+        inputs: Bags (directories, .mcap or .db3 files), recordings, CSV tables, and directories of
+            any of them.
         options: How to read them.
 
     Returns:
@@ -106,16 +112,38 @@ def _sources(path: Path) -> Iterator[tuple[Path, InputKind]]:
     if not path.exists():
         raise InputError(f"{path} does not exist: name a bag, a recording or a CSV table.")
     if path.is_dir():
-        if (path / METADATA).exists() or any(
-            one.suffix in STORAGE_SUFFIXES for one in path.iterdir()
-        ):
-            yield path, InputKind.BAG
-        else:
-            yield from ((one, InputKind.RECORDING) for one in recordings(path))
-    elif path.suffix in STORAGE_SUFFIXES:
-        yield path, InputKind.BAG
+        yield from [(path, InputKind.BAG)] if is_bag(path) else _within(path)
+    elif path.name == METADATA:
+        yield path.absolute().parent, InputKind.BAG
     else:
-        yield path, InputKind.RECORDING if is_recording(path) else InputKind.TABLE
+        yield path, _kind_of(path)
+
+
+def _within(directory: Path) -> Iterator[tuple[Path, InputKind]]:
+    """The demonstrations in a directory that is no bag: recordings, bags or tables."""
+    inside = sorted(directory.iterdir())
+    if any(one.suffix in RECORDED and one.is_file() and is_recording(one) for one in inside):
+        yield from ((one, InputKind.RECORDING) for one in recordings(directory))
+        return
+    bags = [one for one in inside if one.is_dir() and is_bag(one)]
+    tables = [one for one in inside if one.suffix.lower() in _TABLES]
+    if not bags and not tables:
+        yield from ((one, InputKind.RECORDING) for one in recordings(directory))
+        return
+    if bags and tables:
+        raise InputError(
+            f"{directory} holds bags and tables ({bags[0].name}, {tables[0].name}): name those to "
+            "read."
+        )
+    yield from ((one, InputKind.BAG) for one in bags)
+    yield from ((one, InputKind.TABLE) for one in tables)
+
+
+def _kind_of(file: Path) -> InputKind:
+    refuse_strangers(file)
+    if holds_messages(file):
+        return InputKind.BAG
+    return InputKind.RECORDING if is_recording(file) else InputKind.TABLE
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:

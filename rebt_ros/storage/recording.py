@@ -39,6 +39,8 @@ SUFFIX: Final = ".rec"
 
 #: Of version 1.
 _TEXT_SUFFIX: Final = ".csv"
+#: Suffixes of recordings.
+RECORDED: Final = (SUFFIX, _TEXT_SUFFIX)
 
 #: Follows the name of a recording that is kept, but not learned from.
 ASIDE: Final = ".failed"
@@ -247,9 +249,7 @@ def recordings(directory: Path) -> tuple[Path, ...]:
     """
     try:
         files = sorted(
-            one
-            for one in directory.iterdir()
-            if one.suffix in (SUFFIX, _TEXT_SUFFIX) and one.is_file()
+            one for one in directory.iterdir() if one.suffix in RECORDED and one.is_file()
         )
     except NotADirectoryError as err:
         raise InputError(f"{directory} is not a directory: name one with recordings.") from err

@@ -1,0 +1,106 @@
+"""What the metadata.yaml of a bag says of it."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
+from textwrap import shorten
+from typing import Any, Final
+
+from rebt_ros.errors import InputError
+
+NAME: Final = "metadata.yaml"
+
+#: Longest file that is read (bytes): 700 topics with 40 publishers each, whose QoS is told one by
+#: one, make 8 million.
+_LARGEST: Final = 32_000_000
+#: Longest text without QoS that is read as YAML (bytes), which takes a second for each 100,000: 700
+#: topics make 150,000.
+_LARGEST_YAML: Final = 1_000_000
+#: Deepest nesting of brackets; the time that YAML takes grows with its square.
+_DEEPEST: Final = 20
+_ALIAS: Final = re.compile(r"(?:^|[:\-\[,{?])\s*[*&][^\s*&]", re.MULTILINE)
+_QOS: Final = re.compile(r"( *)(?:- )?offered_qos_profiles:(.*)")
+_NEWEST: Final = 9
+
+
+@dataclass(frozen=True, slots=True)
+class BagMetadata:
+    """What a bag says of itself."""
+
+    files: tuple[str, ...] = ()
+    """Names of its files, in their order."""
+    counts: dict[tuple[str, str], int] = field(default_factory=dict)
+    """Messages by topic and type; 0 where the recorder did not come to count them."""
+
+
+def read_metadata(directory: Path) -> BagMetadata | None:
+    """Reads the metadata of a bag; None where there are none.
+
+    Raises:
+        InputError: They cannot be used.
+    """
+    file = directory / NAME
+    if not file.exists():
+        return None
+    if file.stat().st_size > _LARGEST:
+        raise InputError(
+            f"{file} has more than {_LARGEST} bytes, the most that are read: take it away, as the "
+            "bag can be read without it."
+        )
+    text = "\n".join(_without_qos(file.read_text(encoding="utf-8", errors="replace")))
+    if len(text) > _LARGEST_YAML or _ALIAS.search(text) or _nests_deeply(text):
+        raise InputError(
+            f"{file} has YAML anchors, aliases, deep nesting or more than {_LARGEST_YAML} bytes "
+            "beside QoS, which no recorder writes: take it away, as the bag can be read without it."
+        )
+    try:
+        return _parsed(text)
+    except Exception as err:  # of YAML, or whatever else stands there
+        reason = shorten(str(err), 200).rstrip(".") or type(err).__name__
+        raise InputError(
+            f"{file} cannot be read ({reason}): take it away, as the bag can be read without it."
+        ) from err
+
+
+def _parsed(text: str) -> BagMetadata:
+    yaml = importlib.import_module("ruamel.yaml").YAML(typ="safe")
+    about: dict[str, Any] = yaml.load(text)["rosbag2_bagfile_information"]
+    if int(about.get("version", _NEWEST)) > _NEWEST:
+        raise ValueError(f"version {about['version']} is newer than {_NEWEST}")
+    counts: dict[tuple[str, str], int] = {}
+    for one in about.get("topics_with_message_count") or ():
+        topic = one["topic_metadata"]
+        key = str(topic["name"]), str(topic["type"])
+        counts[key] = counts.get(key, 0) + int(one["message_count"])
+    files = tuple(PurePath(str(one)).name for one in about.get("relative_file_paths") or ())
+    return BagMetadata(files, counts)
+
+
+def _without_qos(text: str) -> Iterator[str]:
+    """The lines but for those about QoS, which are long and tell nothing here."""
+    inside: int | None = None
+    for line in text.splitlines():
+        indent = len(line) - len(line.lstrip(" "))
+        if inside is not None:
+            item = indent == inside and line.lstrip(" ").startswith("- ")
+            if not line.strip() or indent > inside or item:
+                continue
+            inside = None
+        found = _QOS.fullmatch(line)
+        if found is None:
+            yield line
+        else:
+            inside = len(found[1])
+
+
+def _nests_deeply(text: str) -> bool:
+    depth = 0
+    for bracket in re.findall(r"[\[\]{}]", text):
+        depth += 1 if bracket in "[{" else -1
+        if depth > _DEEPEST:
+            return True
+    return False
