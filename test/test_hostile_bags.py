@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import sqlite3
 import struct
 import sys
@@ -18,8 +19,9 @@ from fuzz import corpus
 from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
 
 from rebt_ros.errors import InputError
-from rebt_ros.storage import bag_safety
-from rebt_ros.storage.bag import METADATA, read_bag
+from rebt_ros.storage import bag_metadata, bag_safety
+from rebt_ros.storage.bag import read_bag
+from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.inputs import load
 
 if sys.version_info >= (3, 14):
@@ -78,7 +80,7 @@ def test_a_file_that_unpacks_to_too_much_is_refused(
     bag = corpus.bag(tmp_path / "bag", storage, CompressionMode.FILE)
     (file,) = bag.glob("*.zstd")
     file.write_bytes(bomb)
-    with refused("could unpack to|compressed as a whole"):
+    with refused("could unpack to"):
         read_bag(bag)
 
 
@@ -126,9 +128,10 @@ def test_a_chunk_that_unpacks_to_too_much_is_refused(
         read_bag(bag)
 
 
-def test_a_chunk_that_is_indexed_many_times_is_refused(tmp_path: Path) -> None:
-    with refused("its index does not fit its chunks"):
-        read_bag(packed_chunks(tmp_path / "bag", "zstd", zstd.compress, times=1000))
+@pytest.mark.parametrize("times", [0, 1000])
+def test_a_chunk_is_read_once_however_often_it_is_indexed(tmp_path: Path, times: int) -> None:
+    read = read_bag(packed_chunks(tmp_path / "bag", "zstd", zstd.compress, times=times))
+    assert len(read.demonstration) == 1
 
 
 @pytest.mark.parametrize(("name", "pack"), [("zstd", zstd.compress), ("lz4", lz4.frame.compress)])
@@ -229,6 +232,16 @@ def rename_in_metadata(bag: Path, name: str) -> None:
     metadata.write_text(text)
 
 
+def within_the_bag(bag: Path) -> None:
+    """Reads what is in a bag, whatever its metadata say."""
+    alone = bag.with_name("alone")
+    shutil.copytree(bag, alone, ignore=shutil.ignore_patterns(METADATA))
+    wanted = read_bag(alone).demonstration
+    read = read_bag(bag)
+    assert read.demonstration.states.tolist() == wanted.states.tolist()
+    assert any("listed" in note or "cannot be read" in note for note in read.notes)
+
+
 @pytest.mark.parametrize("storage", [MCAP, SQLITE])
 @pytest.mark.parametrize("absolute", [False, True])
 def test_metadata_cannot_name_a_file_outside_of_the_bag(
@@ -237,16 +250,14 @@ def test_metadata_cannot_name_a_file_outside_of_the_bag(
     file = outside(tmp_path, storage)
     bag = corpus.bag(tmp_path / "bag", storage, None)
     rename_in_metadata(bag, str(file) if absolute else f"../outside/{file.name}")
-    with refused("missing|does not exist|damaged"):
-        read_bag(bag)
+    within_the_bag(bag)
 
 
 @pytest.mark.parametrize("name", ["..", ".", "/", "", "'\\0'", "[]", "5"])
 def test_metadata_cannot_name_what_is_no_file(tmp_path: Path, name: str) -> None:
     bag = corpus.bag(tmp_path / "bag", SQLITE, None)
     rename_in_metadata(bag, name)
-    with refused("damaged"):
-        read_bag(bag)
+    within_the_bag(bag)
 
 
 @pytest.mark.parametrize("suffix", [".db3", ""])
@@ -259,8 +270,12 @@ def test_a_name_cannot_lead_out_of_the_bag_as_an_address(tmp_path: Path, suffix:
     name = f"%2e%2e%2foutside%2f{target.name}"
     (bag / "bag.db3").rename(bag / name)
     rename_in_metadata(bag, name)
-    with refused("rename it"):
-        read_bag(bag)
+    shown = read_bag(corpus.bag(tmp_path / "same", SQLITE, None)).demonstration
+    if suffix:
+        assert read_bag(bag).demonstration.states.tolist() == shown.states.tolist()
+    else:
+        with refused("lacks the files"):
+            read_bag(bag)
 
 
 @pytest.mark.parametrize("storage", [MCAP, SQLITE])
@@ -292,50 +307,48 @@ def test_a_pipe_among_recordings_is_not_waited_for(tmp_path: Path) -> None:
 # --- metadata ---------------------------------------------------------------------------------
 
 
-def test_metadata_with_aliases_are_refused(tmp_path: Path) -> None:
+def without_metadata(bag: Path, why: str) -> None:
+    """Reads a bag, within a second, with a note that says why its metadata are not."""
+    began = time.process_time()
+    read = read_bag(bag)
+    assert time.process_time() - began < 1.0
+    assert len(read.demonstration)
+    (note,) = read.notes
+    assert why in note
+    assert note.endswith("the bag is read without it")
+
+
+def test_metadata_with_aliases_are_not_read(tmp_path: Path) -> None:
     bag = corpus.bag(tmp_path / "bag", MCAP, None)
     levels = "".join(f"  l{one}: &l{one} [{f'*l{one - 1}, ' * 9}]\n" for one in range(1, 12))
     text = (bag / METADATA).read_text()
     text = text.replace("  version: 9", "  l0: &l0 [x]\n" + levels + "  version: *l11")
     (bag / METADATA).write_text(text)
-    with refused("has YAML anchors"):
-        read_bag(bag)
+    without_metadata(bag, "has YAML anchors")
 
 
-def test_long_metadata_are_refused(tmp_path: Path) -> None:
+def test_long_metadata_are_not_read(tmp_path: Path) -> None:
     bag = corpus.bag(tmp_path / "bag", MCAP, None)
     with (bag / METADATA).open("a") as metadata:
-        metadata.write("#" * bag_safety.LARGEST_METADATA)
-    with refused("the most that are read"):
-        read_bag(bag)
+        metadata.write("#" * bag_metadata.LARGEST)
+    without_metadata(bag, "the most that are read")
 
 
 NESTED = "[" * 1500
 
 
-def test_deeply_nested_metadata_are_refused(tmp_path: Path) -> None:
+def test_deeply_nested_metadata_are_not_read(tmp_path: Path) -> None:
     bag = corpus.bag(tmp_path / "bag", MCAP, None)
     with (bag / METADATA).open("a") as metadata:
         metadata.write(f"  more: {NESTED}\n")
-    with refused("deep nesting"):
-        read_bag(bag)
+    without_metadata(bag, "deep nesting")
 
 
-def test_deeply_nested_qos_are_refused_in_a_database(tmp_path: Path) -> None:
-    bag = corpus.bag(tmp_path / "bag", SQLITE, None)
+def test_qos_is_not_read_whatever_stands_there(tmp_path: Path) -> None:
+    bag = corpus.bag(tmp_path / "database", SQLITE, None)
     execute(bag, ("UPDATE topics SET offered_qos_profiles = ?", (NESTED,)))
-    with refused("too long or nested"):
-        read_bag(bag)
-
-
-def test_deeply_nested_qos_are_refused_in_an_mcap_file(tmp_path: Path) -> None:
+    assert len(read_bag(bag).demonstration)
     texts = (b"offered_qos_profiles", NESTED.encode())
     metadata = b"".join(struct.pack("<I", len(text)) + text for text in texts)
-    with refused("too long or nested"):
-        read_bag(packed_chunks(tmp_path / "bag", "zstd", zstd.compress, metadata=metadata))
-
-
-def test_a_file_whose_channels_stand_in_its_chunks_only_is_refused(tmp_path: Path) -> None:
-    bag = packed_chunks(tmp_path / "bag", "zstd", zstd.compress, times=0)
-    with refused("does not name all its chunks"):
-        read_bag(bag)
+    bag = packed_chunks(tmp_path / "bag", "zstd", zstd.compress, metadata=metadata)
+    assert len(read_bag(bag).demonstration)

@@ -35,7 +35,7 @@ DECLARED_AS: Final = {
 }
 
 #: Imported only where they are installed.
-OPTIONAL: Final = {"apsw", "distributed", "imblearn", "matplotlib"}
+OPTIONAL: Final = {"distributed", "imblearn", "matplotlib"}
 
 needs_installation = pytest.mark.skipif(
     INSTALLED == CHECKOUT / PACKAGE, reason="run from the checkout, not by 'make test'"

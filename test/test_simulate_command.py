@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from rebt_ros import offline
 from rebt_ros.commands.simulate import main
 from rebt_ros.demonstration.demonstration import Demonstration
-from rebt_ros.demonstration.fields import dimension_labels_of, fields_of
+from rebt_ros.demonstration.fields import Dimension, dimension_labels_of, fields_of
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.options import LearnOptions, Use
@@ -222,7 +222,7 @@ def test_names_with_commas_survive_table_and_bag(tmp_path: Path) -> None:
     run(write(tmp_path, tree), "--ticks", "50", "--out", tmp_path, "--bag", "mcap")
     for source in (tmp_path / "table.csv", tmp_path / "bag"):
         assert [feature.name for feature in demonstration(source).features] == names
-    assert fields_of(dimension_labels_of(names), 2) == tuple(names)
+    assert fields_of([*map(Dimension, dimension_labels_of(names))], 2) == tuple(names)
 
 
 @pytest.mark.parametrize("again", [(), ("--bag", "mcap")])

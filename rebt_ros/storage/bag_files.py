@@ -96,7 +96,7 @@ def opened_bag(path: Path) -> Iterator[BagFiles]:
         bag = BagFiles()
         with explained(path):
             check_bag(path, bag_metadata.NAME)
-            metadata = bag_metadata.read_metadata(path) if path.is_dir() else None
+            metadata = _metadata(path, bag.notes) if path.is_dir() else None
             files = _files(path, metadata, bag.notes) if path.is_dir() else [path]
             for file in files:
                 _open(file, bag, stack)
@@ -104,6 +104,18 @@ def opened_bag(path: Path) -> Iterator[BagFiles]:
             # A recorder that was killed has counted nothing.
             bag.stated |= {topic: count for topic, count in metadata.counts.items() if count}
         yield bag
+
+
+def _metadata(directory: Path, notes: list[str]) -> bag_metadata.BagMetadata | None:
+    """What the metadata say, where there are some that can be read; notes why not."""
+    try:
+        metadata = bag_metadata.read_metadata(directory)
+    except InputError as err:
+        notes.append(f"{str(err).rstrip('.')}: the bag is read without it")
+        return None
+    if metadata is None and len(list(filter(holds_messages, directory.iterdir()))) > 1:
+        notes.append(f"there is no {bag_metadata.NAME}: all files of messages are read as one bag")
+    return metadata
 
 
 def _files(
@@ -119,7 +131,6 @@ def _files(
             raise InputError(
                 f"{directory} is not a bag: name a directory that `ros2 bag record` wrote."
             )
-        notes.append(f"there is no {bag_metadata.NAME}: all its files of messages are read")
         return files
     listed = {name: place for place, name in enumerate(metadata.files)}
     known = {_plain(name) for name in listed}
@@ -157,6 +168,8 @@ def _open_plain(file: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
         magic = opened.read(len(sqlite.MAGIC))
     if magic.startswith(MCAP_MAGIC):
         _open_mcap(file, name, bag, stack)
+    elif file.suffix.lower() == ".mcap":
+        raise ValueError(f"{name} does not begin like an mcap file")
     else:
         _open_sqlite(file, name, bag, stack)
 

@@ -16,7 +16,7 @@ NAME: Final = "metadata.yaml"
 
 #: Longest file that is read (bytes): 700 topics with 40 publishers each, whose QoS is told one by
 #: one, make 8 million.
-_LARGEST: Final = 32_000_000
+LARGEST: Final = 32_000_000
 #: Longest text without QoS that is read as YAML (bytes), which takes a second for each 100,000: 700
 #: topics make 150,000.
 _LARGEST_YAML: Final = 1_000_000
@@ -46,29 +46,24 @@ def read_metadata(directory: Path) -> BagMetadata | None:
     file = directory / NAME
     if not file.exists():
         return None
-    if file.stat().st_size > _LARGEST:
-        raise InputError(
-            f"{file} has more than {_LARGEST} bytes, the most that are read: take it away, as the "
-            "bag can be read without it."
-        )
+    if file.stat().st_size > LARGEST:
+        raise InputError(f"{file} has more than {LARGEST} bytes, the most that are read.")
     text = "\n".join(_without_qos(file.read_text(encoding="utf-8", errors="replace")))
     if len(text) > _LARGEST_YAML or _ALIAS.search(text) or _nests_deeply(text):
         raise InputError(
             f"{file} has YAML anchors, aliases, deep nesting or more than {_LARGEST_YAML} bytes "
-            "beside QoS, which no recorder writes: take it away, as the bag can be read without it."
+            "beside QoS, which no recorder writes."
         )
     try:
         return _parsed(text)
     except Exception as err:  # of YAML, or whatever else stands there
         reason = shorten(str(err), 200).rstrip(".") or type(err).__name__
-        raise InputError(
-            f"{file} cannot be read ({reason}): take it away, as the bag can be read without it."
-        ) from err
+        raise InputError(f"{file} cannot be read ({reason}).") from err
 
 
 def _parsed(text: str) -> BagMetadata:
-    yaml = importlib.import_module("ruamel.yaml").YAML(typ="safe")
-    about: dict[str, Any] = yaml.load(text)["rosbag2_bagfile_information"]
+    safe = importlib.import_module("ruamel.yaml").YAML(typ="safe")
+    about: dict[str, Any] = safe.load(text)["rosbag2_bagfile_information"]
     if int(about.get("version", _NEWEST)) > _NEWEST:
         raise ValueError(f"version {about['version']} is newer than {_NEWEST}")
     counts: dict[tuple[str, str], int] = {}

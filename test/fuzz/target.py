@@ -18,7 +18,7 @@ from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.simulation.experiment_config import as_behavior_tree, parse_config
-from rebt_ros.storage.bag import METADATA
+from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.inputs import InputOptions, load
 
 
