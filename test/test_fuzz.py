@@ -29,7 +29,8 @@ def test_mutated_input_is_taken_or_refused_with_one_sentence(name: str, tmp_path
     assert outcome.accepted + outcome.refused == outcome.inputs == INPUTS[name]
     # Input that is always taken, or always refused at the first look, would show little.
     assert outcome.accepted > 0
-    assert outcome.refused > outcome.accepted
+    # Of bags whatever can be read is read.
+    assert outcome.refused > (0 if name == "bags" else outcome.accepted)
 
 
 def test_mutated_documents_do_not_disturb_a_running_executor(tmp_path: Path) -> None:

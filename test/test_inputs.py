@@ -87,8 +87,34 @@ def test_notes_say_which_demonstration_they_are_about(tmp_path):
 def test_a_bag_is_told_by_its_files_even_without_metadata(tmp_path):
     bag = write_bag(tmp_path / "bag")
     (bag / "metadata.yaml").unlink()
-    with pytest.raises(InputError, match="ros2 bag reindex"):
-        load([bag])
+    assert names(load([bag])) == ["bag"]
+
+
+def test_a_directory_of_bags_is_each_of_them_and_so_is_one_of_tables(tmp_path):
+    for name in ("b", "a"):
+        write_bag(tmp_path / "bags" / name)
+    loaded = load([tmp_path / "bags"])
+    assert names(loaded) == ["a", "b"]
+    assert {name: account.missing for name, account in loaded.accounts.items()} == {"a": 0, "b": 0}
+    assert names(load([tmp_path / "bags" / "a" / "metadata.yaml"])) == ["a"]
+    (tmp_path / "tables").mkdir()
+    for name in ("2.CSV", "1.csv"):
+        (tmp_path / "tables" / name).write_text("x,a\n1,go\n2,turn\n")
+    assert names(load([tmp_path / "tables"])) == ["1.csv", "2.CSV"]
+
+
+@pytest.mark.parametrize(
+    ("begin", "why"),
+    [
+        (b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
+        (b"#ROSBAG V2.0\n\xff", "rosbags-convert --src"),
+    ],
+)
+@pytest.mark.parametrize("name", ["one.mcap", "one.db3", "one.bag", "one.csv"])
+def test_what_is_something_else_is_named_with_what_helps(tmp_path, begin, why, name):
+    (tmp_path / name).write_bytes(begin)
+    with pytest.raises(InputError, match=why):
+        load([tmp_path / name])
 
 
 def test_a_recording_is_told_by_its_first_line_not_by_its_name(tmp_path):

@@ -254,6 +254,9 @@ def refuse_strangers(path: Path) -> None:
     Raises:
         InputError: It says what the file is and what helps.
     """
+    if not path.is_file():
+        # What is read from a pipe is gone.
+        return
     with contextlib.suppress(OSError), path.open("rb") as file:
         begin = file.read(32)
         for magic, what in _STRANGERS:

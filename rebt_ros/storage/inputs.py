@@ -126,7 +126,7 @@ def _within(directory: Path) -> Iterator[tuple[Path, InputKind]]:
         yield from ((one, InputKind.RECORDING) for one in recordings(directory))
         return
     bags = [one for one in inside if one.is_dir() and is_bag(one)]
-    tables = [one for one in inside if one.suffix.lower() in _TABLES]
+    tables = [one for one in inside if one.suffix.lower() in _TABLES and one.is_file()]
     if not bags and not tables:
         yield from ((one, InputKind.RECORDING) for one in recordings(directory))
         return

@@ -19,7 +19,7 @@ from rebt_ros.behavior_tree.svg import render_svg
 from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.simulation.experiment_config import as_behavior_tree, parse_config
 from rebt_ros.storage.bag_metadata import NAME as METADATA
-from rebt_ros.storage.inputs import InputOptions, load
+from rebt_ros.storage.inputs import InputOptions, Loaded, load
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ def _of_files(name: str, directory: Path, seeds: tuple[bytes, ...], file: str) -
         path.write_bytes(mutated_bytes(random, random.choice(seeds), seeds))
         return path
 
-    return Target(name, make, lambda one: load([one]))
+    return Target(name, make, lambda one: _check_accounts(load([one])))
 
 
 def _bags(directory: Path) -> Target:
@@ -92,6 +92,7 @@ def _bags(directory: Path) -> Target:
     seeds = corpus.bags(directory / "seeds")
     files = {seed: {one.name: one.read_bytes() for one in seed.iterdir()} for seed in seeds}
     path = directory / "bags"
+    lists = {"sound": True}
 
     def make(random: Random) -> Path:
         seed = random.choice(seeds)
@@ -99,6 +100,7 @@ def _bags(directory: Path) -> Target:
         others = [data for name, data in content.items() if name != METADATA]
         changed = random.choice((METADATA, *content))
         content[changed] = mutated_bytes(random, content[changed], others)
+        lists.update(sound=changed != METADATA)
         shutil.rmtree(path, ignore_errors=True)
         path.mkdir()
         for name, data in content.items():
@@ -108,9 +110,22 @@ def _bags(directory: Path) -> Target:
         return path / storage if alone and not storage.endswith(".zstd") else path
 
     def read(one: Path) -> None:
-        load([one], InputOptions(skip_bad=True, sample_rate=10.0))
+        loaded = load([one], InputOptions(skip_bad=True, sample_rate=10.0))
+        _check_accounts(loaded)
+        if one.is_dir() and lists["sound"]:
+            # Its metadata tell how many messages there were.
+            [account] = loaded.accounts.values()
+            assert account.read + sum(account.left_out.values()) == account.stated or loaded.notes
 
     return Target("bags", make, read)
+
+
+def _check_accounts(loaded: Loaded) -> None:
+    """Whatever is accepted is accounted for: nothing is missing without a note."""
+    for account in loaded.accounts.values():
+        assert account.rows >= 0
+        assert account.read >= 0
+        assert not account.missing or any("says that it holds" in one for one in loaded.notes)
 
 
 _MAKERS: Final[dict[str, Callable[[Path], Target]]] = {
