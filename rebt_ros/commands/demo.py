@@ -30,7 +30,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 
 from rebt_ros.behavior_tree import nodes
@@ -185,6 +185,8 @@ class Person(Node):
         latest = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.create_subscription(String, "robot/episode", self._on_episode, remembered)
         self.create_subscription(String, "behavior_tree", self._on_document, latest)
+        self.create_subscription(Bool, "recorder/ready", self._on_ready, latest)
+        self._ready = False
         self._at_hand: dict[str, Any] = {
             name: self.create_client(kind, name)
             for name, kind in (
@@ -216,6 +218,7 @@ class Person(Node):
         self._call("robot/set_parameters", SetParameters.Request(parameters=setting))
         self._call("robot/reset", Trigger.Request())
         if record:
+            self._wait(lambda: self._ready, _START_TIMEOUT, "the recorder to hear all topics")
             self._call("recorder/record", SetBool.Request(data=True))
         before = len(self._runs)
         for done in range(runs):
@@ -248,6 +251,9 @@ class Person(Node):
 
     def _on_episode(self, message: String) -> None:
         self._runs.append(json.loads(message.data))
+
+    def _on_ready(self, message: Bool) -> None:
+        self._ready = message.data
 
     def _on_document(self, message: String) -> None:
         self.document = message.data

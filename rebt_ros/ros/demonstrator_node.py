@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool
@@ -12,6 +14,9 @@ from rebt_ros.ros.diagnostics import Faults
 from rebt_ros.ros.parameters import Parameters
 from rebt_ros.simulation.demonstrator import decide
 from rebt_ros.simulation.robot import State
+
+#: How long to wait for those who are there and not connected yet (seconds).
+_PATIENCE = 5.0
 
 
 class DemonstratorNode(Node):
@@ -25,6 +30,7 @@ class DemonstratorNode(Node):
         super().__init__("demonstrator")
         self._enabled = Parameters(self).flag("enabled", True, "Whether to drive from the start.")()
         self._faults = Faults(self.get_logger())
+        self._waiting_since: float | None = None
         self._actions = self.create_publisher(String, "action", 10)
         self.create_subscription(Float64MultiArray, "state", self._on_state, 1)
         self.create_service(SetBool, "~/enable", self._on_enable)
@@ -41,7 +47,15 @@ class DemonstratorNode(Node):
                 f"its layout must name {', '.join(State._fields)}.",
             )
             return
-        self._actions.publish(String(data=decide(values)))
+        if self._is_heard():
+            self._actions.publish(String(data=decide(values)))
+
+    def _is_heard(self) -> bool:
+        """Whether all who listen to the actions will get them; waits for them a while only."""
+        if self._actions.get_subscription_count() >= self.count_subscribers("action"):
+            return True
+        self._waiting_since = self._waiting_since or time.monotonic()
+        return time.monotonic() - self._waiting_since > _PATIENCE
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         self._enabled = request.data

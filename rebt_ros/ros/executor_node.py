@@ -30,6 +30,7 @@ from rebt_ros.ros.background import Background
 from rebt_ros.ros.command_channels import DRIVING_QOS, CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.executor_settings import declare_settings
+from rebt_ros.ros.graph_watch import GraphWatch
 from rebt_ros.ros.novelty_guard import NoveltyGuard
 from rebt_ros.ros.takeover import Takeover, channel_of
 from rebt_ros.ros.topic_names import check_topics
@@ -89,6 +90,7 @@ class ExecutorNode(Node):
         self._ticks = 0
         self._commands = 0
         self._slowest = 0.0
+        self._watch = GraphWatch(self)
         self._last_snapshot = ""
         self._watchers = 0
         self._snapshot = self.create_publisher(String, "~/snapshot", 10)
@@ -123,8 +125,9 @@ class ExecutorNode(Node):
         self._diagnostics = Diagnostics(self, "execution", self._report)
         self._say_who_drives()
         self.get_logger().info(
-            f"{'enabled' if self._enabled else 'disabled until ~/enable is called'}: "
-            f"{self._condition()}."
+            f"enabled: {self._condition()}."
+            if self._enabled
+            else "disabled until ~/enable is called."
         )
 
     def close(self) -> None:
@@ -451,7 +454,23 @@ class ExecutorNode(Node):
         if self._faults.recent:
             return Report(Level.WARN, f"{condition}; {self._faults.recent}", values)
         blocked = self._enabled and condition != "running"
+        problems = self._problems() if self._enabled else []
+        if problems:
+            return Report(Level.WARN, "; ".join((condition, *problems)), values)
         return Report(Level.WARN if blocked else Level.OK, condition, values)
+
+    def _problems(self) -> list[str]:
+        """What in the graph keeps the tree from driving, or makes it a matter of chance."""
+        commands = self._channels.topics
+        return [
+            *self._watch.timeless(),
+            *self._watch.several(
+                ["behavior_tree"], "trees", "chance decides which one drives; stop all but one"
+            ),
+            *self._watch.several(commands, "commands", "stop all but one"),
+            *self._watch.unheard(self._subscriptions_by_topic.values()),
+            *self._watch.unread(commands),
+        ]
 
 
 def main(args: list[str] | None = None) -> None:

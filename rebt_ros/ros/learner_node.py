@@ -20,6 +20,7 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.errors import RebtError
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
+from rebt_ros.ros.graph_watch import GraphWatch
 from rebt_ros.ros.learner_settings import declare_settings
 from rebt_ros.ros.learning_process import (
     LearningCancelledError,
@@ -66,6 +67,7 @@ class LearnerNode(Node):
         self._last = Report(Level.OK, "idle: nothing was learned yet")
         self._learned: LearnedTree | None = None
         self._figures: Mapping[str, str] = {}
+        self._watch = GraphWatch(self)
         self._settings = declare_settings(self)
         self._publisher = self.create_publisher(String, "behavior_tree", TREE_QOS)
         self._publish_what_is_on_disk()
@@ -221,7 +223,13 @@ class LearnerNode(Node):
             progress = call.progress
             values |= {"stage": progress.stage, "progress (%)": round(100 * progress.share)}
             return Report(Level.OK, str(call), values)
-        return Report(self._last.level, self._last.message, values | {"stage": "idle"})
+        values["stage"] = "idle"
+        problems = self._watch.several(
+            ["behavior_tree"], "trees", "executors follow one by chance; stop all but one"
+        )
+        if problems:
+            return Report(Level.WARN, "; ".join((self._last.message, *problems)), values)
+        return Report(self._last.level, self._last.message, values)
 
 
 class _Call:

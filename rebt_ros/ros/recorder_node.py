@@ -25,6 +25,7 @@ from rebt_ros.ros.arrays import names_of, values_of
 from rebt_ros.ros.arrival import LAST, ArrivalOrder
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
+from rebt_ros.ros.graph_watch import GraphWatch
 from rebt_ros.ros.losses import Losses
 from rebt_ros.ros.recorder_settings import declare_settings
 from rebt_ros.ros.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
@@ -110,6 +111,9 @@ class RecorderNode(Node):
         self._listen_to_executor()
         topics = [source.topic_name for source in self._sources]
         self._sending = SendingTime(self, topics, settings.pair_by)
+        self._watch = GraphWatch(self)
+        self._ready = self.create_publisher(Bool, "~/ready", DRIVING_QOS)
+        self._said_ready: bool | None = None
         self._begin()
 
     def _begin(self) -> None:
@@ -118,7 +122,7 @@ class RecorderNode(Node):
         group = MutuallyExclusiveCallbackGroup()
         for name, kind, command in (
             ("~/record", SetBool, self._record),
-            ("~/new_demonstration", Trigger, lambda _, stamp: self._session.renew(stamp)),
+            ("~/new_demonstration", Trigger, self._renew),
             ("~/discard_demonstration", Trigger, lambda _, stamp: self._session.discard(stamp)),
             ("~/failed", Trigger, lambda _, stamp: self._session.fail(stamp)),
         ):
@@ -266,10 +270,29 @@ class RecorderNode(Node):
         return received_at(info) if sent is None else sent
 
     def _look_at_publishers(self) -> None:
+        ready = not self._unheard()
+        if ready is not self._said_ready:
+            self._said_ready = ready
+            self._ready.publish(Bool(data=ready))
         silent = self._sending.look()
         for topic in self._settings.state_topics:
             if self.resolve_topic_name(topic.name) in silent:
                 self._streams.end(topic.name)
+
+    def _unheard(self) -> list[str]:
+        """Topics that would be missing in a demonstration that began now."""
+        demonstrators = self._sources[: len(self._settings.sources)]
+        states = {topic.name for topic in self._settings.state_topics}
+        return [
+            name
+            for name, source in zip(self._settings.sources, demonstrators, strict=True)
+            if (name not in self._heard if name in states else not source.get_publisher_count())
+        ]
+
+    def _problems(self) -> list[str]:
+        """What in the graph keeps this node from recording."""
+        demonstrators = self._sources[: len(self._settings.sources)]
+        return [*self._watch.timeless(), *self._watch.unheard(demonstrators)]
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any
@@ -284,7 +307,20 @@ class RecorderNode(Node):
         return response
 
     def _record(self, request: SetBool.Request, stamp: int) -> Answer:
-        return self._session.start(stamp) if request.data else self._session.stop(stamp)
+        if not request.data:
+            return self._session.stop(stamp)
+        return self._with_what_is_missing(self._session.start(stamp))
+
+    def _renew(self, _: Trigger.Request, stamp: int) -> Answer:
+        return self._with_what_is_missing(self._session.renew(stamp))
+
+    def _with_what_is_missing(self, answer: Answer) -> Answer:
+        unheard = self._unheard()
+        if not self._session.recording or not unheard:
+            return answer
+        return answer._replace(
+            message=f"{answer.message} Not heard so far: {', '.join(unheard)}; wait for ~/ready."
+        )
 
     def _queue(self, place: int, take: Callable[[], object], *, waits: bool = False) -> None:
         self._order.push(place, take, time.monotonic_ns(), waits=waits)
@@ -361,6 +397,9 @@ class RecorderNode(Node):
             return Report(Level.OK, "not recording", values)
         if self._faults.recent:
             return Report(Level.WARN, self._faults.recent, values)
+        problems = self._problems()
+        if problems:
+            return Report(Level.WARN, "; ".join(problems), values)
         if silent:
             return Report(Level.WARN, f"no messages on {', '.join(silent)}", values)
         if session.awaited:

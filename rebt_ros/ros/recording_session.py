@@ -206,6 +206,9 @@ class RecordingSession:
         ended = self._end(stamp)
         self._builder = None
         self.awaited = False
+        if not ended.success and not self.failure and self.rows:
+            rows = _count(self.rows)
+            return Answer(True, f"stopped; {rows} were recorded before, and none since.")
         return Answer(ended.success, f"stopped; {ended.message}")
 
     def renew(self, stamp: int) -> Answer:
@@ -317,7 +320,7 @@ class RecordingSession:
             self._take_due(stamp)
         writer, self._writer = self._writer, None
         if writer is None:
-            return Answer(True, "no rows were recorded.")
+            return Answer(False, "no rows were recorded.")
         try:
             writer.set_aside() if aside else writer.close()
         except RebtError as err:
