@@ -88,6 +88,26 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tup
     )
 
 
+def agreement_on(learned: LearnedTree, table: DemonstrationTable) -> float | None:
+    """Own-history agreement of a tree with rows that another one was judged on.
+
+    Args:
+        learned: The tree.
+        table: Rows of one channel, as they were learned from.
+
+    Returns:
+        None where there are no rows, or where the tree is about other channels or features.
+    """
+    policy = nodes.policies(learned.tree).get(table.channel)
+    if policy is None or not len(table):
+        return None
+    try:
+        rows = _as_the_tree_reads(learned, table.channel, policy, table)
+    except InputError:
+        return None
+    return float(np.mean(evaluation.own_history_choices(policy, rows) == rows.chosen))
+
+
 def _late(learned: LearnedTree, table: DemonstrationTable) -> int:
     """The rows by which the demonstrator was late when the tree was learned, in this recording."""
     seconds, rows = learned.provenance.late_seconds, learned.provenance.late_rows

@@ -423,3 +423,44 @@ def test_a_tree_that_cannot_be_written_is_not_published(
         assert json.loads((tmp_path / "learned" / "tree.json").read_text())["version"]
         _latest(peer, trees, 1)
         assert len(trees) == 1
+
+
+def test_the_tree_before_is_published_again_on_request(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    with NodeProcess("learner_node", domain, tmp_path):
+        heard = peer.listen(String, "behavior_tree", LATCHED)
+        assert not peer.call("/learner/rollback").success
+        assert peer.call("/learner/relearn").success
+        _latest(peer, heard, 1)
+        _record(tmp_path / "demonstrations", 80, ("go", "stop"))
+        assert peer.call("/learner/relearn").success
+        _latest(peer, heard, 2)
+        assert heard[0].data != heard[1].data
+        answer = peer.call("/learner/rollback")
+        assert answer.success, answer.message
+        _latest(peer, heard, 3)
+        assert heard[2].data == heard[0].data
+        assert (tmp_path / "learned" / "tree.json").read_text() == heard[0].data
+        assert not peer.call("/learner/rollback").success
+
+
+def test_a_tree_that_agrees_too_little_is_held_back_with_the_reason(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    with NodeProcess("learner_node", domain, tmp_path, {"keep_if_better": True}):
+        heard = peer.listen(String, "behavior_tree", LATCHED)
+        assert peer.call("/learner/relearn").success
+        _latest(peer, heard, 1)
+        assert peer.call("/learner/relearn").success
+        _latest(peer, heard, 2)
+        _set(peer, min_agreement=1.0)
+        _record(tmp_path / "demonstrations", 60, ("turn", "go"))
+        answer = peer.call("/learner/relearn")
+        assert not answer.success
+        assert "min_agreement is 100.0%: it is not published" in answer.message
+        assert "the tree before it stays" in answer.message
+        _status(peer, "min_agreement")
+        assert len(heard) == 2

@@ -314,7 +314,7 @@ def test_the_robot_tutor_is_learned_with_its_missing_and_label_free_cells() -> N
     kinds = {feature.name: feature.kind for feature in learned.features}
     assert learned.provenance.rows == 1000 - 186
     assert any("186 of 1000 rows" in note for note in result.notes)
-    assert kinds["/ExerciseSubmissionResult"] is FeatureKind.CATEGORICAL
+    assert kinds["/ExerciseSubmissionResult"] is FeatureKind.BINARY
     assert kinds["/KC"] is FeatureKind.NUMERIC
     assert len(learned.actions) == 4
     assert learned.provenance.figures.fidelity_mismatches == 0

@@ -26,10 +26,12 @@ from rebt_ros.ros.learning_process import (
     LearningCancelledError,
     LearningError,
     LearningProcess,
+    Lesson,
     Progress,
 )
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.tree_file import find_tree
+from rebt_ros.storage.tree_versions import TreeVersions
 
 #: Who subscribes later gets the latest tree, too.
 TREE_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -83,6 +85,7 @@ class LearnerNode(Node):
         group = ReentrantCallbackGroup()
         self.create_service(Trigger, "~/relearn", self._relearn, callback_group=group)
         self.create_service(Trigger, "~/cancel", self._cancel, callback_group=group)
+        self.create_service(Trigger, "~/rollback", self._rollback, callback_group=group)
 
     def interrupt(self) -> None:
         """Ends the learning process, also while it learns, and with it a call of ~/relearn."""
@@ -142,7 +145,7 @@ class LearnerNode(Node):
 
     def _learn(self, call: _Call) -> str:
         """Learns, writes and publishes; returns what a person wants to know."""
-        request = self._settings.request()
+        request = self._settings.request(dumps(self._learned) if self._learned else "")
         path = self._settings.output() / _TREE_FILE
         lesson = self._process.ask(
             request,
@@ -153,14 +156,59 @@ class LearnerNode(Node):
         for note in lesson.notes:
             self.get_logger().warning(f"{note}.")
         learned = loads(lesson.document)
+        self._hold_back(lesson)
         with self._lock:
             if call.cancelled.is_set():
                 raise LearningCancelledError
             call.progress = _PUBLISHING
         write_text_atomically(path, lesson.document)
+        self._versions().keep(lesson.document)
         self._figures = lesson.figures
         self._publish(learned, lesson.document)
         return f"{lesson.sentence} It is published and in {path}.{_in_short(lesson.notes)}"
+
+    def _hold_back(self, lesson: Lesson) -> None:
+        """Refuses a tree that is not to be published.
+
+        Raises:
+            LearningError: It agrees too little with the rows that were held out.
+        """
+        least, agreement = self._settings.least_agreement(), lesson.agreement
+        stays = "it is not published, and the tree before it stays."
+        if least and (agreement is None or agreement < least):
+            told = "with no held-out rows" if agreement is None else f"with {agreement:.1%} of them"
+            raise LearningError(
+                f"{lesson.sentence} It agrees {told}, and min_agreement is {least:.1%}: {stays}"
+            )
+        if lesson.rival is not None and (agreement is None or agreement < lesson.rival):
+            raise LearningError(
+                f"{lesson.sentence} The published tree agrees with {lesson.rival:.1%} of the same "
+                f"held-out rows, and keep_if_better is set: {stays}"
+            )
+
+    def _versions(self) -> TreeVersions:
+        return TreeVersions(self._settings.output() / "trees", self._settings.kept_trees())
+
+    def _rollback(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Publishes the tree before."""
+        with self._lock:
+            if self._call is not None:
+                response.message = f"busy: {self._call}; call again when that is done."
+                return response
+            try:
+                path, document = self._versions().go_back()
+                learned = loads(document)
+                write_text_atomically(self._settings.output() / _TREE_FILE, document)
+            except (RebtError, OSError) as err:
+                response.message = str(err)
+                return response
+            self._figures = {}
+            self._publish(learned, document)
+        response.success = True
+        response.message = f"published the tree before, {path}."
+        self._last = Report(Level.OK, response.message)
+        self.get_logger().info(response.message)
+        return response
 
     def _note(self, call: _Call, progress: Progress) -> None:
         entered = progress.stage != call.progress.stage
@@ -197,6 +245,10 @@ class LearnerNode(Node):
             self.get_logger().info(f"there is no tree in {path} yet: call ~/relearn to learn one.")
             return
         self._publish(learned, dumps(learned))
+        try:
+            self._versions().keep(dumps(learned))
+        except RebtError as err:
+            self.get_logger().warning(str(err))
         self._last = Report(Level.OK, f"idle: published the tree in {path}")
         self.get_logger().info(f"published the tree in {path}.")
 

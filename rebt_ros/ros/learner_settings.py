@@ -29,13 +29,22 @@ class LearnerSettings:
     """Where tree.json is written to."""
     timeout: Callable[[], float]
     """How long learning may take, seconds; 0 for no limit."""
+    least_agreement: Callable[[], float]
+    """With held-out rows; trees that agree less are not published."""
+    only_better: Callable[[], bool]
+    """Whether a tree that is worse than the one that is published is not published."""
+    kept_trees: Callable[[], int]
+    """How many of the published trees are kept."""
     binary: Callable[[], tuple[str, ...]]
     categorical: Callable[[], tuple[str, ...]]
     options: Mapping[str, Callable[[], object]]
     """By the names that they have in `LearnOptions`."""
 
-    def request(self) -> Request:
+    def request(self, published: str) -> Request:
         """What is to be learned from what, and how, as the parameters are now.
+
+        Args:
+            published: The document that is published now.
 
         Raises:
             OptionError: A directory makes no sense.
@@ -45,6 +54,7 @@ class LearnerSettings:
             {name: read() for name, read in self.options.items()},
             self.binary(),
             self.categorical(),
+            published if self.only_better() else "",
         )
 
 
@@ -71,6 +81,28 @@ def declare_settings(node: Node) -> LearnerSettings:
             "Learning that takes longer is stopped (seconds); 0.0 for no limit.",
             0.0,
             1e6,
+            fixed=False,
+        ),
+        least_agreement=declare.number(
+            "min_agreement",
+            0.0,
+            "Least own-history agreement with held-out rows of a tree that is published.",
+            0.0,
+            1.0,
+            fixed=False,
+        ),
+        only_better=declare.flag(
+            "keep_if_better",
+            False,
+            "Whether the published tree stays where it agrees more with the same held-out rows.",
+            fixed=False,
+        ),
+        kept_trees=declare.integer(
+            "kept_trees",
+            20,
+            "How many of the trees that were published are kept in OUTPUT/trees, for ~/rollback.",
+            2,
+            100_000,
             fixed=False,
         ),
         binary=declare.texts(

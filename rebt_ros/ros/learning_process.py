@@ -37,6 +37,8 @@ class Request:
     options: Mapping[str, Any]
     binary_features: Sequence[str] = ()
     categorical_features: Sequence[str] = ()
+    published: str = ""
+    """The document that is published now, to be judged on the same rows; empty for none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +62,10 @@ class Lesson:
     """What a person should know about the recordings and about the tree; no full stops."""
     figures: Mapping[str, str] = field(default_factory=dict)
     """How well it may do, for /diagnostics."""
+    agreement: float | None = None
+    """With the held-out rows, after its own choices; None where none were held out."""
+    rival: float | None = None
+    """The same of the tree that is published, on the same rows; None where it cannot be told."""
 
 
 class LearningError(RebtError):

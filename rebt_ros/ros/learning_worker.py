@@ -13,14 +13,17 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.ros.learning_process import Lesson, Progress, Request
+
+if TYPE_CHECKING:
+    from rebt_ros.pipeline import Learning
 
 #: Of all the work, what reading the recordings is.
 _READING: Final = 0.1
@@ -172,7 +175,27 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
             for channel, one in led.items()
             for name, value in one.figures().items()
         },
+        learned.provenance.figures.own_history_agreement,
+        _agreement_of(request.published, learnings),
     )
+
+
+def _agreement_of(document: str, learnings: Sequence[Learning]) -> float | None:
+    """Agreement of the published tree with all rows that were held out."""
+    from rebt_ros.behavior_tree.document import loads
+    from rebt_ros.replaying import agreement_on
+
+    if not document:
+        return None
+    published = loads(document)
+    agreeing = rows = 0.0
+    for learning in learnings:
+        held_out = learning.table.where(learning.held_out)
+        agreement = agreement_on(published, held_out)
+        if agreement is None:
+            return None
+        agreeing, rows = agreeing + agreement * len(held_out), rows + len(held_out)
+    return agreeing / rows if rows else None
 
 
 if __name__ == "__main__":

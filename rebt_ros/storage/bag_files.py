@@ -243,7 +243,7 @@ _STRANGERS: Final[Sequence[tuple[bytes, str]]] = (
     ),
     (
         b"#ROSBAG V",
-        "is a bag of ROS 1: convert it with `rosbags-convert --src {0} --dst DIRECTORY`",
+        "is a bag of ROS 1: convert it with `rosbags-convert --src FILE --dst DIRECTORY`",
     ),
 )
 
@@ -261,7 +261,7 @@ def refuse_strangers(path: Path) -> None:
         begin = file.read(32)
         for magic, what in _STRANGERS:
             if begin.startswith(magic):
-                raise InputError(f"{path} {what.format(path)}.")
+                raise InputError(f"{path} {what}.")
 
 
 def _explanation(path: Path, err: Exception) -> InputError:

@@ -1,0 +1,80 @@
+"""Every tree that was published, so that the one before can be published again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from rebt_ros.errors import InputError
+from rebt_ros.storage.atomic import StorageError, write_text_atomically
+from rebt_ros.storage.text import read_text
+
+_SUFFIX: Final = ".json"
+_UNDONE: Final = ".undone"
+
+
+class TreeVersions:
+    """Trees in a directory, numbered as they were published.
+
+    Args:
+        directory: Is made when it is needed.
+        most: How many are kept, the newest ones; at least 2.
+    """
+
+    def __init__(self, directory: Path, most: int) -> None:
+        self._directory = directory
+        self._most = most
+
+    def keep(self, document: str) -> Path:
+        """Adds a tree that is published; one that is the newest already is not added again.
+
+        Raises:
+            StorageError: It cannot be written, or an old one not be removed.
+        """
+        numbered = self._numbered()
+        if numbered and self._text(numbered[-1]) == document:
+            return numbered[-1]
+        number = max((_number(one) for one in self._all()), default=0) + 1
+        path = self._directory / f"{number:06}{_SUFFIX}"
+        write_text_atomically(path, document)
+        try:
+            for old in [*self._numbered()[: -self._most], *self._all(_UNDONE)[: -self._most]]:
+                old.unlink(missing_ok=True)
+        except OSError as err:
+            raise StorageError(f"{self._directory} cannot be tidied ({err.strerror}).") from err
+        return path
+
+    def go_back(self) -> tuple[Path, str]:
+        """Takes the newest one out, which stays as a file, and returns the one before it.
+
+        Raises:
+            InputError: There is none before it, or it cannot be read.
+        """
+        numbered = self._numbered()
+        if len(numbered) < 2:
+            raise InputError(f"there is no tree before this one in {self._directory}.")
+        document = read_text(numbered[-2])
+        numbered[-1].rename(numbered[-1].with_suffix(f"{_SUFFIX}{_UNDONE}"))
+        return numbered[-2], document
+
+    def _numbered(self) -> list[Path]:
+        return self._all(_SUFFIX)
+
+    def _all(self, suffix: str = "") -> list[Path]:
+        if not self._directory.is_dir():
+            return []
+        return sorted(
+            one
+            for one in self._directory.iterdir()
+            if one.name.split(".")[0].isdecimal() and one.name.endswith(suffix)
+        )
+
+    def _text(self, path: Path) -> str:
+        try:
+            return read_text(path)
+        except InputError:
+            return ""
+
+
+def _number(path: Path) -> int:
+    return int(path.name.split(".")[0])

@@ -1,0 +1,36 @@
+"""Trees that were published, by number."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rebt_ros.errors import InputError
+from rebt_ros.storage.tree_versions import TreeVersions
+
+
+def test_the_tree_before_comes_back_however_often_it_is_asked_for(tmp_path: Path) -> None:
+    versions = TreeVersions(tmp_path / "trees", 20)
+    for document in ("one", "two", "three", "three"):
+        versions.keep(document)
+    assert versions.go_back()[1] == "two"
+    assert versions.go_back()[1] == "one"
+    with pytest.raises(InputError, match="no tree before this one"):
+        versions.go_back()
+    # Numbers are not used again.
+    assert versions.keep("four").name == "000004.json"
+    assert versions.go_back()[1] == "one"
+    assert {one.name for one in (tmp_path / "trees").iterdir()} == {
+        "000001.json",
+        "000002.json.undone",
+        "000003.json.undone",
+        "000004.json.undone",
+    }
+
+
+def test_only_the_newest_trees_are_kept(tmp_path: Path) -> None:
+    versions = TreeVersions(tmp_path, 3)
+    for number in range(10):
+        versions.keep(str(number))
+    assert sorted(one.read_text() for one in tmp_path.iterdir()) == ["7", "8", "9"]
