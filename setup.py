@@ -11,6 +11,14 @@ from setuptools.command.install_scripts import install_scripts
 PACKAGE = "rebt_ros"
 NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
 
+#: Begins an executable: it finds the package beside it, also where nothing was sourced.
+OWN_MODULES = """\
+import os, sys
+sys.path.insert(0, os.path.join(
+    os.path.dirname(os.path.dirname(os.path.realpath(__file__))),
+    "python%d.%d" % sys.version_info[:2], "site-packages"))
+"""
+
 
 class InstallScripts(install_scripts):
     """Starts the nodes with SIGINT and SIGTERM blocked; rebt_ros.ros.entry unblocks them.
@@ -23,7 +31,8 @@ class InstallScripts(install_scripts):
         """Writes an executable."""
         first, newline, rest = contents.partition("\n")
         blocking = _env_that_blocks() if script_name in NODES else None
-        super().write_script(script_name, _first_line(first, blocking) + newline + rest, mode)
+        begin = _first_line(first, blocking) + newline
+        super().write_script(script_name, begin + OWN_MODULES + rest, mode)
 
 
 def _first_line(line, blocking):

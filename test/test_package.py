@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 import doctest
 import importlib
+import os
 import re
+import subprocess
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -171,3 +173,49 @@ def test_the_parameter_files_are_installed() -> None:
 def test_the_examples_in_docstrings_are_true(path: Path) -> None:
     results = doctest.testmod(importlib.import_module(_module_name(path)))
     assert results.failed == 0
+
+
+def _first_line(line: str, blocking: tuple[str, str] | None) -> str:
+    """What setup.py, which cannot be imported, writes in place of the first line of a script."""
+    tree = ast.parse((CHECKOUT / "setup.py").read_text(encoding="utf-8"))
+    functions = [
+        one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == "_first_line"
+    ]
+    namespace: dict[str, object] = {}
+    exec(compile(ast.Module(functions, []), "setup.py", "exec"), namespace)
+    written = namespace["_first_line"](line, blocking)  # type: ignore[operator]
+    assert isinstance(written, str)
+    return written
+
+
+@pytest.mark.parametrize("blocking", [None, ("/usr/bin/env", "--block-signal=INT,TERM")])
+def test_an_executable_starts_where_the_path_of_the_interpreter_has_blanks(
+    tmp_path: Path, blocking: tuple[str, str] | None
+) -> None:
+    directory = tmp_path / "my ws, # and %"
+    directory.mkdir()
+    interpreter = directory / "python"
+    interpreter.symlink_to(sys.executable)
+    script = directory / "script"
+    begin = _first_line(f'#!"{interpreter}"', blocking)
+    script.write_text(f"{begin}\nimport sys\nprint(sys.argv[1:])\n")
+    script.chmod(0o755)
+    done = subprocess.run([script, "a b"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "['a b']\n", "")
+    plain = f"#!{sys.executable}"
+    assert _first_line(plain, None) == plain
+
+
+@needs_installation
+@pytest.mark.parametrize("command", ["learn", "show", "recorder"])
+def test_an_executable_finds_its_package_where_nothing_was_sourced(command: str) -> None:
+    executable = INSTALLED.parents[2] / PACKAGE / command
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if "PYTHON" not in name and "AMENT" not in name
+    }
+    done = subprocess.run(
+        [executable, "--help"], capture_output=True, text=True, env=environment, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
