@@ -464,3 +464,19 @@ def test_a_tree_that_agrees_too_little_is_held_back_with_the_reason(
         assert "the tree before it stays" in answer.message
         _status(peer, "min_agreement")
         assert len(heard) == 2
+
+
+def test_a_relearn_writes_what_learn_writes_and_a_robot_in_a_namespace_has_its_own_directories(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations" / "one")
+    arguments = ["-r", "__ns:=/one"]
+    with NodeProcess("learner_node", domain, tmp_path, {}, arguments) as learner:
+        learner.says(f"to learn one from {tmp_path / 'demonstrations' / 'one'}")
+        answer = peer.call("/one/learner/relearn")
+        assert answer.success, answer.message
+    written = {one.name for one in (tmp_path / "learned" / "one").iterdir()}
+    assert {"tree.json", "tree.txt", "tree.svg", "tree.dot", "summary.json", "trees"} <= written
+    summary = json.loads((tmp_path / "learned" / "one" / "summary.json").read_text())
+    assert summary["rows"] == 60
+    assert summary["reasons"]

@@ -163,6 +163,8 @@ class LearnerNode(Node):
             call.progress = _PUBLISHING
         write_text_atomically(path, lesson.document)
         self._versions().keep(lesson.document)
+        for name, text in lesson.files.items():
+            write_text_atomically(path.with_name(name), text)
         self._figures = lesson.figures
         self._publish(learned, lesson.document)
         return f"{lesson.sentence} It is published and in {path}.{_in_short(lesson.notes)}"
@@ -242,7 +244,10 @@ class LearnerNode(Node):
             self.get_logger().warning(self._last.message)
             return
         if learned is None:
-            self.get_logger().info(f"there is no tree in {path} yet: call ~/relearn to learn one.")
+            self.get_logger().info(
+                f"there is no tree in {path.absolute()} yet: call ~/relearn to learn one from "
+                f"{self._settings.demonstrations().absolute()}."
+            )
             return
         self._publish(learned, dumps(learned))
         try:
@@ -250,7 +255,10 @@ class LearnerNode(Node):
         except RebtError as err:
             self.get_logger().warning(str(err))
         self._last = Report(Level.OK, f"idle: published the tree in {path}")
-        self.get_logger().info(f"published the tree in {path}.")
+        self.get_logger().info(
+            f"published the tree in {path.absolute()}; ~/relearn learns from "
+            f"{self._settings.demonstrations().absolute()}."
+        )
 
     def _publish(self, learned: LearnedTree, document: str) -> None:
         self._learned = learned

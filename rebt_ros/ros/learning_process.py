@@ -64,6 +64,8 @@ class Lesson:
     """How well it may do, for /diagnostics."""
     agreement: float | None = None
     """With the held-out rows, after its own choices; None where none were held out."""
+    files: Mapping[str, str] = field(default_factory=dict)
+    """What else is to be written beside the tree, by name: pictures, text and the summary."""
     rival: float | None = None
     """The same of the tree that is published, on the same rows; None where it cannot be told."""
 

@@ -23,6 +23,7 @@ from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.ros.learning_process import Lesson, Progress, Request
 
 if TYPE_CHECKING:
+    from rebt_ros.offline import OfflineLearning
     from rebt_ros.pipeline import Learning
 
 #: Of all the work, what reading the recordings is.
@@ -118,7 +119,7 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
     Raises:
         RebtError: They cannot be used, or an option makes no sense.
     """
-    from rebt_ros import pipeline
+    from rebt_ros import offline, pipeline
     from rebt_ros.behavior_tree.document import dumps
     from rebt_ros.behavior_tree.learned_tree import Root
     from rebt_ros.decision_tree.upsampling import Upsampling
@@ -176,8 +177,25 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
             for name, value in one.figures().items()
         },
         learned.provenance.figures.own_history_agreement,
+        _files(offline.OfflineLearning(learned, learnings, tuple(notes))),
         _agreement_of(request.published, learnings),
     )
+
+
+def _files(result: OfflineLearning) -> dict[str, str]:
+    """What `learn` writes beside the tree, but for PNG files."""
+    from rebt_ros import offline
+    from rebt_ros.behavior_tree.dot import render_dot
+    from rebt_ros.behavior_tree.svg import render_svg
+    from rebt_ros.behavior_tree.text import render_text
+
+    summary = offline.summarize(result) | {"notes": list(result.notes)}
+    return {
+        "tree.txt": render_text(result.learned),
+        "tree.svg": render_svg(result.learned),
+        "tree.dot": render_dot(result.learned),
+        "summary.json": json.dumps(summary, indent=2, ensure_ascii=False) + "\n",
+    }
 
 
 def _agreement_of(document: str, learnings: Sequence[Learning]) -> float | None:

@@ -107,6 +107,9 @@ class Parameters:
     ) -> Callable[[], Path]:
         """A directory; ``~`` is the user's home.
 
+        The default one of a node in a namespace is a directory of that name in it, so that robots
+        side by side do not share theirs by accident.
+
         Raises:
             OptionError: It is empty, or the home of nobody.
         """
@@ -115,7 +118,10 @@ class Parameters:
         def path() -> Path:
             if not read():
                 raise OptionError(f"parameter {name!r} is empty: give it a directory.")
-            return at_home(name, read())
+            given = at_home(name, read())
+            if read() == default:
+                return given / self._node.get_namespace().strip("/")
+            return given
 
         path()
         return path

@@ -29,6 +29,7 @@ from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.demonstration.builder import LARGEST_VALUE, is_label
 from rebt_ros.demonstration.demonstration import Demonstration, Row, in_sorted_order
 from rebt_ros.errors import InputError
+from rebt_ros.storage.account import Account
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording_head import Head
 
@@ -145,12 +146,16 @@ def read_rows(path: Path, file: BinaryIO, head: Head) -> Read:
                 "restore the file from a copy, or move it elsewhere."
             )
         seen += len(records)
-    notes = []
+    notes, left_out = [], {}
     if rest:
         notes.append("its last row is incomplete and left out")
+        left_out["are incomplete"] = 1
     if damaged >= 0:
         notes.append(f"its last {seen - damaged} records are damaged and left out")
-    return Read(columns.demonstration(), tuple(notes))
+        left_out["are damaged"] = seen - damaged
+    shown = columns.demonstration()
+    stated, sound_ones = seen + bool(rest), damaged if damaged >= 0 else seen
+    return Read(shown, tuple(notes), Account("records", stated, sound_ones, len(shown), left_out))
 
 
 def _chunks(file: BinaryIO, kind: np.dtype[np.void], count: int) -> Iterator[Records]:
