@@ -10,6 +10,7 @@ from typing import Any, Final
 from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
@@ -154,14 +155,16 @@ class RecorderNode(Node):
         self._take_waiting_messages()
         for take in self._order.flush(self._complete(time.monotonic_ns())):
             take()
+        # A signal has shut the context down, and the node's own logger publishes what it says.
+        logger = self.get_logger() if self.context.ok() else get_logger("rebt_ros")
         if self._order.held:
-            self.get_logger().warning(
+            logger.warning(
                 f"{self._order.held} actions are left out: the states that they belong to had not "
                 "come when the recorder was stopped."
             )
         if self._session.recording:
             answer = self._session.stop(self._stamp(time.time_ns()))
-            log = self.get_logger().info if answer.success else self.get_logger().error
+            log = logger.info if answer.success else logger.error
             log(answer.message)
 
     def _open_writer(self, features: tuple[Feature, ...], origin: Origin) -> Writer:
