@@ -114,8 +114,17 @@ def test_no_file_is_opened_without_a_row() -> None:
     desk.session.start(0)
     desk.session.observe(1, "state", [1.0], [])
     answer = desk.session.stop(2)
-    assert (answer.success, "no rows" in answer.message) == (True, True)
+    assert (answer.success, "no rows" in answer.message) == (False, True)
     assert desk.disk.files == []
+
+
+def test_what_was_recorded_before_counts_where_nothing_was_since() -> None:
+    desk = desk_with_state()
+    desk.session.act(2, "action", "go")
+    assert desk.session.renew(3).success
+    answer = desk.session.stop(4)
+    assert answer.success
+    assert answer.message == "stopped; no rows since the last demonstration, 1 row in all."
 
 
 def test_a_full_disk_ends_a_demonstration_and_room_begins_another() -> None:

@@ -208,7 +208,7 @@ class RecordingSession:
         self.awaited = False
         if not ended.success and not self.failure and self.rows:
             rows = _count(self.rows)
-            return Answer(True, f"stopped; {rows} were recorded before, and none since.")
+            return Answer(True, f"stopped; no rows since the last demonstration, {rows} in all.")
         return Answer(ended.success, f"stopped; {ended.message}")
 
     def renew(self, stamp: int) -> Answer:
@@ -230,6 +230,8 @@ class RecordingSession:
         taken_over = self.recording and self.origin is Origin.TAKEOVER
         if self.recording:
             ended = self._end(stamp, aside=taken_over)
+            # What failed may have failed before anybody did anything.
+            ended = ended._replace(success=not self.failure)
         else:
             # States were not taken since they were added last.
             self._recent.clear()
@@ -320,7 +322,8 @@ class RecordingSession:
             self._take_due(stamp)
         writer, self._writer = self._writer, None
         if writer is None:
-            return Answer(False, "no rows were recorded.")
+            # Nobody has to show what failed, nor what a tree does.
+            return Answer(self.awaited or self.origin is Origin.TAKEOVER, "no rows were recorded.")
         try:
             writer.set_aside() if aside else writer.close()
         except RebtError as err:
