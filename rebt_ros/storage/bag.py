@@ -87,7 +87,8 @@ def read_bag(
             RowKind.EVENT if sample_rate is None else RowKind.SAMPLE,
         )
         stated = sum(bag.stated.get(topic, bag.found[topic]) for topic in wanted)
-    return Read(demonstration, (*bag.notes, *feed.notes()), feed.account(stated, demonstration))
+        notes = (*bag.notes, *_differences(bag, wanted), *feed.notes())
+    return Read(demonstration, notes, feed.account(stated, demonstration))
 
 
 @dataclass(slots=True)
@@ -287,6 +288,21 @@ def _unpacked(data: bytes) -> bytes:
 def _messages(path: Path, bag: BagFiles, wanted: set[Topic]) -> Iterator[tuple[Topic, int, bytes]]:
     with explained(path):
         yield from bag.messages(wanted)
+
+
+def _differences(bag: BagFiles, wanted: set[Topic]) -> Iterator[str]:
+    """Notes of what the account, which is about all topics together, does not tell."""
+    for name in sorted({name for name, _ in wanted}):
+        if count := bag.others_found[name]:
+            yield f"left out: messages on {name} that are {bag.others[name]}: {count}"
+    told = {topic: bag.stated.get(topic, bag.found[topic]) for topic in sorted(wanted)}
+    if sum(told.values()) == sum(bag.found[topic] for topic in told):
+        for topic, stated in told.items():
+            if stated != bag.found[topic]:
+                yield (
+                    f"the input says that {topic[0]} has {stated} messages, and "
+                    f"{bag.found[topic]} were found"
+                )
 
 
 def _topics(bag: BagFiles) -> dict[str, str]:

@@ -56,6 +56,8 @@ class BagFiles:
     """Messages of ROS 2 by topic; with 0 where there is none."""
     others: dict[str, str] = field(default_factory=dict)
     """Encoding of the messages of other topics."""
+    others_found: Counter[str] = field(default_factory=Counter)
+    """Messages of those, by topic."""
     stated: dict[Topic, int] = field(default_factory=dict)
     """How many the bag says that there are; only where it does."""
     notes: list[str] = field(default_factory=list)
@@ -102,7 +104,7 @@ def opened_bag(path: Path) -> Iterator[BagFiles]:
                 _open(file, bag, stack)
         if metadata is not None:
             # A recorder that was killed has counted nothing.
-            bag.stated |= {topic: count for topic, count in metadata.counts.items() if count}
+            bag.stated |= {topic: count for topic, count in metadata.counts.items() if count > 0}
         yield bag
 
 
@@ -183,6 +185,7 @@ def _open_mcap(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
             number[channel] = (about.topic, about.kind)
         else:
             bag.others[about.topic] = about.encoding or "unknown"
+            bag.others_found[about.topic] += survey.found[channel]
 
     def read(topics: Collection[Topic]) -> Iterator[Message]:
         wanted = {channel: topic for channel, topic in number.items() if topic in topics}
@@ -192,8 +195,7 @@ def _open_mcap(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
     counts, stated = Counter[Topic](), Counter[Topic]()
     for channel, topic in number.items():
         counts[topic] += survey.found[channel]
-        if survey.stated is not None:
-            stated[topic] += survey.stated.get(channel, 0)
+        stated[topic] += survey.stated_of(channel)
     bag.add(counts, stated, read)
     if not survey.is_complete:
         bag.notes.append(
@@ -202,6 +204,12 @@ def _open_mcap(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
     if survey.damaged:
         chunks = "chunk is" if survey.damaged == 1 else "chunks are"
         bag.notes.append(f"{name} is damaged: {survey.damaged} {chunks} left out")
+    if survey.cut:
+        chunks = "chunk ends" if survey.cut == 1 else "chunks end"
+        bag.notes.append(
+            f"{name} is damaged: {survey.cut} {chunks} inside of a message: what is whole was read"
+        )
+    _note_undeclared(survey.undeclared, name, bag)
 
 
 def _open_sqlite(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
@@ -221,7 +229,15 @@ def _open_sqlite(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None
     for one in sqlite.topics(connection):
         if one.number in topics:
             counts[topics[one.number]] += one.messages
+        else:
+            bag.others_found[one.name] += one.messages
     bag.add(counts, {}, read)
+    _note_undeclared(sqlite.undeclared(connection), name, bag)
+
+
+def _note_undeclared(count: int, name: str, bag: BagFiles) -> None:
+    if count:
+        bag.notes.append(f"left out: messages of topics that {name} does not describe: {count}")
 
 
 @contextmanager

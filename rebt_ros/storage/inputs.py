@@ -56,7 +56,7 @@ class Loaded:
 
 
 #: Suffixes of tables in a directory, in lower case.
-_TABLES = frozenset({".csv", ".tsv", ".txt"})
+_TABLES = frozenset({".csv", ".tsv"})
 
 
 class InputKind(Enum):
@@ -122,10 +122,18 @@ def _sources(path: Path) -> Iterator[tuple[Path, InputKind]]:
 def _within(directory: Path) -> Iterator[tuple[Path, InputKind]]:
     """The demonstrations in a directory that is no bag: recordings, bags or tables."""
     inside = sorted(directory.iterdir())
-    if any(one.suffix in RECORDED and one.is_file() and is_recording(one) for one in inside):
+    bags = [one for one in inside if one.is_dir() and is_bag(one)]
+    recorded = (
+        one for one in inside if one.suffix in RECORDED and one.is_file() and is_recording(one)
+    )
+    if first := next(recorded, None):
+        if bags:
+            raise InputError(
+                f"{directory} holds bags and recordings ({bags[0].name}, {first.name}): name those "
+                "to read."
+            )
         yield from ((one, InputKind.RECORDING) for one in recordings(directory))
         return
-    bags = [one for one in inside if one.is_dir() and is_bag(one)]
     tables = [one for one in inside if one.suffix.lower() in _TABLES and one.is_file()]
     if not bags and not tables:
         yield from ((one, InputKind.RECORDING) for one in recordings(directory))

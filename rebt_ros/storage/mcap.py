@@ -21,10 +21,15 @@ from rebt_ros.storage.packing import unlz4, unzstd
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 
-_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _STATISTICS = 2, 3, 4, 5, 6, 11
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX, _STATISTICS = 2, 3, 4, 5, 6, 7, 11
 #: Channel, sequence, log time, publish time: before the data of a message.
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 _RECORD_HEAD: Final = struct.Struct("<BQ")
+_INDEX_HEAD: Final = struct.Struct("<HI")
+#: Stamp and place of one message in an index (bytes).
+_INDEX_ENTRY: Final = 16
+#: Records outside of chunks are handled in parts of about this size (bytes).
+_PART: Final = 1 << 20
 
 
 _UNPACKING: Final[Mapping[str, Callable[[bytes], bytes]]] = {
@@ -64,12 +69,27 @@ class Survey:
     """Messages by channel."""
     stated: dict[int, int] | None = None
     """The same as the file's statistics say it; None where there are none."""
+    indexed: Counter[int] = field(default_factory=Counter)
+    """The same as the indexes of chunks say it; chunks may lack theirs."""
     damaged: int = 0
     """Chunks that cannot be unpacked."""
+    cut: int = 0
+    """Chunks that end inside of a record."""
     is_complete: bool = False
     """Whether the file has its end."""
     in_order: bool = True
     """Whether chunks follow each other in time."""
+
+    @property
+    def undeclared(self) -> int:
+        """Messages of channels that the file does not describe."""
+        return sum(count for channel, count in self.found.items() if channel not in self.channels)
+
+    def stated_of(self, channel: int) -> int:
+        """Messages of a channel that the file says it holds, or that it was found to hold."""
+        if self.stated is not None:
+            return self.stated.get(channel, 0)
+        return max(self.found[channel], self.indexed[channel])
 
 
 class McapFile:
@@ -107,8 +127,9 @@ class McapFile:
         self.survey = survey = Survey()
         before = latest = 0
         for part in self._parts():
-            before = latest
+            before, whole = latest, 0
             for kind, content in _records_in(part):
+                whole += _RECORD_HEAD.size + len(content)
                 if kind == _SCHEMA:
                     self._note_schema(content)
                 elif kind == _CHANNEL:
@@ -119,12 +140,14 @@ class McapFile:
                     latest = max(latest, stamp)
                     if stamp < before:
                         survey.in_order = False
+            survey.cut += whole < len(part)
         return survey
 
     def _parts(self) -> Iterator[bytes]:
         """The records of each chunk, and those between chunks, in the order of the file."""
         survey, loose = self.survey, bytearray()
         survey.damaged = 0
+        survey.indexed.clear()
         for kind, start, length in self._records():
             if kind == _CHUNK:
                 if loose:
@@ -137,6 +160,12 @@ class McapFile:
                     yield chunk
             elif kind in (_SCHEMA, _CHANNEL, _MESSAGE):
                 loose += _RECORD_HEAD.pack(kind, length) + self._content(start, length)
+                if len(loose) >= _PART:
+                    yield bytes(loose)
+                    loose.clear()
+            elif kind == _INDEX and length >= _INDEX_HEAD.size:
+                channel, size = _INDEX_HEAD.unpack(self._content(start, _INDEX_HEAD.size))
+                survey.indexed[channel] += min(size, length) // _INDEX_ENTRY
             elif kind == _STATISTICS:
                 survey.stated = _stated(self._content(start, length))
             elif kind == _FOOTER:

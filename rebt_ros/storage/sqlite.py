@@ -67,6 +67,14 @@ def topics(connection: sqlite3.Connection) -> tuple[SqliteTopic, ...]:
     )
 
 
+def undeclared(connection: sqlite3.Connection) -> int:
+    """How many messages belong to no topic of the file."""
+    [(count,)] = connection.execute(
+        "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"
+    )
+    return int(count)
+
+
 def messages(
     connection: sqlite3.Connection, numbers: Collection[int]
 ) -> Iterator[tuple[int, int, bytes]]:
@@ -77,7 +85,8 @@ def messages(
         "ORDER BY timestamp, id",
         tuple(numbers),
     ):
-        yield int(number), int(stamp), bytes(data)
+        # A number or a text there is no message; `bytes` would make one of as many zeros.
+        yield int(number), int(stamp), data if isinstance(data, bytes) else b""
 
 
 def _connected(path: Path, how: str) -> sqlite3.Connection:
