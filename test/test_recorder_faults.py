@@ -146,7 +146,7 @@ def test_lost_messages_are_counted_and_warned_of(domain: int, peer: Peer, tmp_pa
 def test_two_recorders_in_one_directory_do_not_mix_rows(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    arguments = ["-r", "__ns:=/other"]
+    arguments = ["-r", "__ns:=/other", "-p", f"demonstrations:={tmp_path}/demonstrations"]
     with (
         NodeProcess("recorder_node", domain, tmp_path) as one,
         NodeProcess("recorder_node", domain, tmp_path, arguments=arguments) as other,

@@ -232,7 +232,7 @@ def test_fields_are_named_by_parameter_and_channels_kept_apart(
         peer.action("wave", topic="/robot/arm")
         peer.action("stop", topic="/robot/base")
         assert peer.call("/robot/recorder/record", False).success
-    (demonstration,) = _recorded(tmp_path / "demonstrations")
+    (demonstration,) = _recorded(tmp_path / "demonstrations" / "robot")
     assert [one.name for one in demonstration.features] == ["x", "y", "battery[0]"]
     assert [one.topic for one in demonstration.features] == ["pose", "pose", "battery"]
     channels = [demonstration.channels[code] for code in demonstration.channel]
