@@ -13,6 +13,7 @@ import pytest
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.storage.csv_table import read_csv
+from rebt_ros.storage.inputs import load
 from rebt_ros.storage.read import Read
 
 ROWS = 60
@@ -119,6 +120,40 @@ DIALECTS: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
         _written([[f"try {place}", *row] for place, row in enumerate(_plain())], ["said", *NAMES]),
         ("'said' holds 60 different texts",),
     ),
+    "a separator that is said": (
+        "sep=;\n" + _written(_decimal_commas(), delimiter=";"),
+        ("semicolons", "'dist' is read as numbers, with decimal commas"),
+    ),
+    "blanks": (_written(_plain(), delimiter=" "), ("separated by blanks",)),
+    "several blanks": (
+        "\n".join("  ".join(f"{cell:<9}" for cell in row) for row in [NAMES, *_plain()]),
+        ("separated by blanks",),
+    ),
+    "single quotes": (
+        "\n".join(",".join(f"'{cell}'" for cell in row) for row in [NAMES, *_plain()]) + "\n",
+        ("quoted by single quotes",),
+    ),
+    "names in a comment": (f"#{_written(_plain())}", ("a line of comments", "what the comment")),
+    "names again": (
+        _written([*_plain()[:30], NAMES, *_plain()[30:]]),
+        ("1 line repeats the column names",),
+    ),
+    "empty rows": (
+        _written([*_plain()[:30], [""] * 5, [""] * 5, *_plain()[30:]]),
+        ("2 lines are empty",),
+    ),
+    "comments in the table": (
+        _written([*_plain()[:30], ["# a break"], *_plain()[30:], ["# the end"]]),
+        ("2 lines are comments",),
+    ),
+    "an index without a name": (
+        _written([[str(place), *row] for place, row in enumerate(_plain())], ["", *NAMES]),
+        ("'Unnamed: 0' numbers or dates the rows",),
+    ),
+    "the action first": (
+        _written([[row[-1], *row[:-1]] for row in _plain()], [NAMES[-1], *NAMES[:-1]]),
+        ("'action' is taken for the actions",),
+    ),
     "no names": (_written(_plain(), None), ("the first line holds data",)),
 }
 
@@ -150,8 +185,21 @@ def test_however_a_table_is_written_it_is_the_same_demonstration(
     for note in notes:
         assert any(note in one for one in read.notes), read.notes
     assert read.account is not None
-    assert read.account.stated == read.account.read == ROWS
+    assert read.account.read == ROWS
     assert not read.account.missing
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_each_line_of_a_table_has_a_place_in_its_account(dialect: str, tmp_path: Path) -> None:
+    text, _ = DIALECTS[dialect]
+    if isinstance(text, bytes):
+        text = text.decode("utf-16" if dialect == "utf-16" else "utf-8-sig")
+    read = _read(tmp_path, text)
+    before = sum(line.startswith(("#", "sep=")) for line in text.splitlines()[:2])
+    names = dialect not in {"no names", "names in a comment"}
+    assert read.account is not None
+    assert read.account.stated == len(text.splitlines()) - before - names
+    assert read.account.stated == read.account.read + sum(read.account.left_out.values())
 
 
 def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Path) -> None:
@@ -169,6 +217,7 @@ def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Pat
         (["5 °C", "-7.5 °C"], [5, -7.5]),
         (["1e3 m/s", "2.5 m/s"], [1000, 2.5]),
         (["0,5 m", "12 m"], [0.5, 12]),
+        (["1.234.567", "312"], [1_234_567, 312]),
     ],
 )
 def test_numbers_are_read_as_people_write_them(
@@ -191,16 +240,152 @@ def test_what_is_written_in_several_ways_is_text(cells: list[str], tmp_path: Pat
         ["red,0.134,go", "green,0.5,turn", "red,0.7,go"],
         ["red,0.134,go", "green,0.5,turn", "blue,0.7,turn"],
         ["red,3,go", "green,5,turn", "blue,7,go"],
+        ["red,0.134 m,go", "green,0.5 m,turn", "blue,0.7 m,go"],
+        ["red;0,134;go", "green;0,5;turn", "blue;0,7;go"],
+        ["red,13%,go", "green,50 %,turn", "blue,70%,go"],
+        ["False,a,go", "True,b,turn", "False,a,go"],
+        ["no,a,go", "yes,b,turn", "no,a,go"],
+        ["red,a,go", "green,b,turn", "red,b,go", "green,a,turn", "red,a,turn"],
+        ["NA,0.5,go", "0.5,0.25,turn", "0.75,0.5,go"],
     ],
 )
 def test_a_first_row_of_data_is_no_line_of_names(rows: list[str], tmp_path: Path) -> None:
     read = _read(tmp_path, "\n".join(rows) + "\n")
-    assert len(read.demonstration) == 3
+    assert len(read.demonstration) == len(rows)
     assert [one.name for one in read.demonstration.features] == ["x0", "x1"]
-    assert read.notes[0].startswith("the first line holds data")
+    assert any(note.startswith("the first line holds data") for note in read.notes)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["color,action", "red,go", "green,turn", "color,action", "red,turn"],
+        ["color,on,action", "red,on,go", "green,off,turn"],
+        ["color,on,action", "red,1,go", "green,0,turn"],
+        ["date,color,action", "2026-01-02,red,go", "2026-01-03,green,turn"],
+        ["y,t,action", "y,t,go", "n,f,turn"],
+        ["width 5 m,action", "1 m,go", "2 m,go"],
+        ["docked,action", "True,go", "False,stop"],
+    ],
+)
+def test_names_above_words_and_amounts_are_no_data(lines: list[str], tmp_path: Path) -> None:
+    read = _read(tmp_path, "\n".join(lines) + "\n")
+    assert not any("first line holds data" in note for note in read.notes)
 
 
 @pytest.mark.parametrize("names", ["color,dist,action", "0,1,action", "dist,2nd,action"])
 def test_names_are_no_data(names: str, tmp_path: Path) -> None:
     read = _read(tmp_path, f"{names}\n0.5,0.7,go\n0.25,0.3,turn\n")
     assert len(read.demonstration) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("2020,2021,action\n5,6,go\n7,8,turn\n", ["2020", "2021"]),
+        ("# by hand\n# dist,load,action\n0.5,6,go\n0.7,8,turn\n", ["dist", "load"]),
+        ("# place,color,action\nhall,red,go\nhall,blue,turn\nyard,red,go\n", ["place", "color"]),
+        (",dist,,action\n3,0.5,6,go\n1,0.7,8,turn\n", ["Unnamed: 0", "dist", "x2"]),
+    ],
+)
+def test_columns_are_called_what_the_file_says(text: str, names: list[str], tmp_path: Path) -> None:
+    read = _read(tmp_path, text)
+    found = [feature.name for feature in read.demonstration.features]
+    assert found == [name for name in names if name != "Unnamed: 0"]
+    assert read.notes
+
+
+@pytest.mark.parametrize(
+    ("name", "cells"),
+    [
+        ("t", "0.1,0.2,0.3"),
+        ("Time (s)", "0.1,0.2,0.2,0.3"),
+        ("time_ns", "100,200,300"),
+        ("header.stamp", "1.5,1.6,1.7"),
+        ("id", "7,8,9"),
+        ("frame_id", "0,1,2"),
+        ("date", "20260101,20260102,20260103"),
+    ],
+)
+def test_columns_that_rise_number_the_rows_if_their_names_say_so(
+    name: str, cells: str, tmp_path: Path
+) -> None:
+    def features(column: str, values: list[str]) -> list[str]:
+        rows = [[value, str(place % 2), "go"] for place, value in enumerate(values)]
+        read = _read(tmp_path, _written(rows, [column, "x", "a"]))
+        return [feature.name for feature in read.demonstration.features]
+
+    rising = cells.split(",")
+    assert features(name, rising) == ["x"]
+    assert features(name, rising[::-1]) == [name, "x"]
+    assert features("dist", rising) == ["dist", "x"]
+
+
+@pytest.mark.parametrize(
+    "cells", ["01/02/26,13/02/26", '"Jan 5, 2026","Feb 6, 2026"', "5 Jan 2026,NaT", "5-Jan-26,"]
+)
+def test_dates_are_known_however_they_are_written(cells: str, tmp_path: Path) -> None:
+    rows = "".join(f"{cell},{place},go\n" for place, cell in enumerate(next_cells(cells)))
+    read = _read(tmp_path, f"when,x,a\n{rows}")
+    assert [feature.name for feature in read.demonstration.features] == ["x"]
+
+
+def next_cells(line: str) -> list[str]:
+    """The cells of a line, quoted again."""
+    return [f'"{cell}"' for cell in next(csv.reader([line]))]
+
+
+@pytest.mark.parametrize("word", ["None", "?", "#N/A", "unknown", "NaT"])
+def test_words_for_no_value_are_missing_among_numbers_however_many(
+    word: str, tmp_path: Path
+) -> None:
+    rows = [[str(x), "go"] for x in range(5)] + [[word, "turn"]] * 20
+    read = _read(tmp_path, _written(rows, ["x", "a"]))
+    assert read.demonstration.features[0].kind is FeatureKind.NUMERIC
+    assert np.isnan(read.demonstration.states[5:]).all()
+
+
+def test_a_text_that_says_none_is_a_text(tmp_path: Path) -> None:
+    read = _read(tmp_path, "held,a\nnone,go\ncup,turn\nnone,go\n")
+    assert read.demonstration.features[0].categories == ("cup", "none")
+
+
+def test_actions_that_may_be_none_or_the_same_are_noted(tmp_path: Path) -> None:
+    read = _read(tmp_path, "x,a\n1,GO\n2,go\n3,None\n4,turn\n5,GO\n")
+    assert len(read.demonstration) == 5
+    assert read.notes == (
+        "'None' is taken for an action: leave cells without one empty",
+        "'GO', 'go' are different actions: write them alike if they are one",
+    )
+
+
+def test_a_last_column_of_numbers_beside_words_is_noted(tmp_path: Path) -> None:
+    read = _read(tmp_path, "do,x,docked\ngo,0.5,1\nturn,0.7,0\ngo,0.5,1\nturn,0.9,0\n")
+    assert read.demonstration.actions == ("0", "1")
+    assert "'do' holds words" in read.notes[0]
+
+
+def test_points_part_thousands_where_other_columns_have_decimal_commas(tmp_path: Path) -> None:
+    read = _read(tmp_path, "dist;load;a\n0,5;1.234;go\n0,75;312;turn\n")
+    assert read.demonstration.states.tolist() == [[0.5, 1234], [0.75, 312]]
+    assert any("'load' is read as numbers, without their points" in note for note in read.notes)
+
+
+def test_what_is_no_feature_in_a_table_is_none_in_the_others(tmp_path: Path) -> None:
+    rising = tmp_path / "rising.csv"
+    falling = tmp_path / "falling.csv"
+    rising.write_text("step,x,a\n1,5,go\n2,6,go\n3,7,turn\n")
+    falling.write_text("step,x,a\n3,5,go\n2,6,go\n1,7,turn\n")
+    loaded = load([rising, falling])
+    assert all(
+        [feature.name for feature in one.features] == ["x"] and one.states.shape == (3, 1)
+        for one in loaded.demonstrations
+    )
+    assert any("falling.csv: no feature in every table" in note for note in loaded.notes)
+
+
+def test_so_many_texts_are_no_feature_that_memory_stays_linear(tmp_path: Path) -> None:
+    rows = [[str(row % 7), f"n{row % 1500}", "go"] for row in range(4000)]
+    read = _read(tmp_path, _written(rows, ["x", "c", "a"]))
+    assert [one.name for one in read.demonstration.features] == ["x"]
+    assert any("'c' holds 1500 different texts" in note for note in read.notes)

@@ -17,8 +17,8 @@ Dates and times are no features, and neither are texts that hardly ever recur.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence, Set
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,30 +26,48 @@ from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 
 #: Words for a value that is not there, in lower case.
-_MISSING = frozenset({"", "na", "n/a", "nan", "null", "-", "--"})
+_MISSING = frozenset(
+    {"", "na", "n/a", "n.a.", "#n/a", "#na", "<na>", "nan", "nat", "null", "-", "--", "?"}
+)
+#: Words for it, among numbers and truths; among texts they may be texts as well.
+_MAYBE_MISSING = frozenset({"none", "nil", "missing", "unknown", "undefined"})
 
 _TRUTH = {
     **dict.fromkeys(("true", "yes", "on", "t", "y", "1", "1.0"), 1.0),
     **dict.fromkeys(("false", "no", "off", "f", "n", "0", "0.0"), 0.0),
 }
 
+#: Words of truth that no column is called.
+_NO_NAMES = frozenset({"true", "false", "yes", "no"})
+
 #: What stands between groups of three digits.
 _SEPARATORS = "[ ,'\u2019\u00a0\u202f]"
 _THOUSANDS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{_SEPARATORS}\d{{3}})+(?:\.\d+)?")
+#: Points between them, where they cannot be decimal points: several, or by what other columns say.
+_POINTED = re.compile(r"[+-]?\d{1,3}(?:\.\d{3}){2,}")
+_MAYBE_POINTED = re.compile(r"[+-]?\d{1,3}(?:\.\d{3})*")
 _DECIMAL_COMMA = re.compile(r"[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*),\d+(?:[eE][+-]?\d+)?")
 _UNIT = re.compile(
     r"(?P<number>[^A-Za-z°µμΩ%]*\d[eE][+-]?\d+|[^A-Za-z°µμΩ%]*\d\.?) ?(?P<unit>\D.*)"
 )
-_DATE = r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}"
+_MONTH = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*\.?"
+_DATE = (
+    r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d{2})"
+    rf"|(?:[A-Z][a-z]+,? )?(?:{_MONTH} \d{{1,2}},?|\d{{1,2}}\.?[ -]{_MONTH})[ -]\d{{2}}(?:\d{{2}})?"
+)
 _TIME = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
-_MOMENT = re.compile(rf"(?:{_DATE})(?:[T ]{_TIME}(?:Z|[+-]\d{{2}}:?\d{{2}})?)?|{_TIME}")
+_ZONE = r" ?(?:Z|UTC|GMT|[+-]\d{2}:?\d{2})"
+_MOMENT = re.compile(rf"(?:{_DATE})(?:,?[T ]{_TIME}(?:{_ZONE})?)?|{_TIME}")
 
 #: Of cells most of which are numbers, this share must be; and so many different ones, as otherwise
 #: they are codes.
 _MOSTLY, _MANY_NUMBERS = 0.9, 20
 #: Texts may all differ in so few rows; in more, half of them must recur.
 _FEW_TEXTS, _RECURRING = 20, 0.5
+#: Nor more texts than that: each is an indicator of as many cells as there are rows.
+_MOST_TEXTS = 1000
 _LONGEST_UNIT = 12
+_WITH_COMMAS, _WITHOUT_SEPARATORS = "with decimal commas", "without their thousands separators"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -61,6 +79,8 @@ class Column:
     """Numbers, 0 or 1, positions in the feature's categories, or NaN: shape (cells,)."""
     notes: tuple[str, ...] = ()
     """How its cells were read, where that is not plain; no full stops."""
+    decimal_commas: bool = False
+    """Whether a comma is its decimal separator."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +95,36 @@ def is_missing(cell: str) -> bool:
     return cell.lower() in _MISSING
 
 
+def is_maybe_missing(cell: str) -> bool:
+    """Whether a cell says that there is no value if it stands among numbers or truths."""
+    return cell.lower() in _MAYBE_MISSING
+
+
 def is_number(cell: str) -> bool:
     """Whether a cell is a number as every tool reads it."""
     return bool(cell) and numbers((cell,)) is not None
+
+
+def is_value_like(cell: str, others: Iterable[str]) -> bool:
+    """Whether a cell is a number, date, time or truth, written as all others that hold something.
+
+    Words of truth that may well be names, such as `on`, do not count.
+
+    Args:
+        cell: It, with or without blanks around it.
+        others: Of the same column.
+    """
+    cell = cell.strip()
+    filled = [other for one in others if not is_missing(other := one.strip())]
+    if is_missing(cell) or not filled:
+        return False
+    cells = [cell, *filled]
+    return (
+        numbers(cells) is not None
+        or (cell.lower() in _NO_NAMES and all(one.lower() in _TRUTH for one in cells))
+        or all(map(_MOMENT.fullmatch, cells))
+        or _in_notation("", cells, set(cells)) is not None
+    )
 
 
 def numbers(cells: Sequence[str]) -> FloatArray | None:
@@ -99,37 +146,63 @@ def codes(labels: Sequence[str], cells: Sequence[str]) -> IntArray:
     return np.fromiter(map(code.__getitem__, cells), np.int64, len(cells))
 
 
-def column(name: str, cells: Sequence[str], line: Callable[[int], int]) -> Column | NoFeature:
+def column(
+    name: str, cells: Sequence[str], line: Callable[[int], int], *, decimal_commas: bool = False
+) -> Column | NoFeature:
     """Reads a column.
 
     Args:
         name: Of the column.
         cells: Its cells, with or without blanks around them.
         line: The line on which a cell stands, by its position.
+        decimal_commas: Whether the numbers of the table are known to have decimal commas.
     """
     plain = numbers(cells)
+    if plain is None:
+        cells = ["" if is_missing(stripped := cell.strip()) else stripped for cell in cells]
+        plain = numbers(cells)
     if plain is not None:
-        return _numeric(name, plain)
-    cells = ["" if is_missing(stripped := cell.strip()) else stripped for cell in cells]
-    plain = numbers(cells)
-    if plain is not None:
-        return _numeric(name, plain)
+        return (_grouped(name, cells) if decimal_commas else None) or _numeric(name, plain)
     distinct = set(cells) - {""}
-    if {cell.lower() for cell in distinct} <= _TRUTH.keys():
-        truth = [_TRUTH[cell.lower()] if cell else np.nan for cell in cells]
-        return Column(Feature(name, FeatureKind.BINARY), np.array(truth))
     if all(map(_MOMENT.fullmatch, distinct)):
         return NoFeature(f"column {name!r} holds dates or times and is no feature")
+    sure = [cell for cell in distinct if not is_maybe_missing(cell)]
+    if sure and len(sure) < len(distinct):
+        filled = ["" if is_maybe_missing(cell) else cell for cell in cells]
+        if (found := _amounts(name, filled, set(sure))) is not None:
+            (word, *_) = (cell for cell in cells if is_maybe_missing(cell))
+            note = f"cells of column {name!r} that say {word!r} are missing values"
+            return replace(found, notes=(*found.notes, note))
     return (
-        _in_notation(name, cells, distinct)
+        _amounts(name, cells, distinct)
         or _mostly_numbers(name, cells, line)
         or _texts(name, cells, distinct, line)
     )
 
 
-def _numeric(name: str, values: FloatArray, *notes: str) -> Column:
+def _amounts(name: str, cells: Sequence[str], distinct: Set[str]) -> Column | None:
+    """Truths, or numbers however they are written; None where a cell is neither."""
+    if {cell.lower() for cell in distinct} <= _TRUTH.keys():
+        truth = [_TRUTH[cell.lower()] if cell else np.nan for cell in cells]
+        return Column(Feature(name, FeatureKind.BINARY), np.array(truth))
+    plain = numbers(cells)
+    return _in_notation(name, cells, distinct) if plain is None else _numeric(name, plain)
+
+
+def _numeric(name: str, values: FloatArray, *notes: str, decimal_commas: bool = False) -> Column:
     empty = (f"column {name!r} is empty",) if np.isnan(values).all() else ()
-    return Column(Feature(name), values, (*notes, *empty))
+    return Column(Feature(name), values, (*notes, *empty), decimal_commas)
+
+
+def _grouped(name: str, cells: Sequence[str]) -> Column | None:
+    """Numbers with points that cannot be decimal ones; None where there is no such number."""
+    filled = [cell for cell in cells if cell]
+    if not any("." in cell for cell in filled) or not all(map(_MAYBE_POINTED.fullmatch, filled)):
+        return None
+    values = numbers([cell.replace(".", "") for cell in cells])
+    assert values is not None
+    note = f"column {name!r} is read as numbers, without their points, as others have commas"
+    return _numeric(name, values, note)
 
 
 def _in_notation(name: str, cells: Sequence[str], distinct: Iterable[str]) -> Column | None:
@@ -140,6 +213,7 @@ def _in_notation(name: str, cells: Sequence[str], distinct: Iterable[str]) -> Co
         cells = [_without_unit(cell) for cell in cells]
         said.append("without their percent signs" if unit == "%" else f"without their unit {unit}")
     values = numbers(cells)
+    how = ""
     if values is None:
         decimal = _with_points(cells)
         if decimal is None:
@@ -149,7 +223,8 @@ def _in_notation(name: str, cells: Sequence[str], distinct: Iterable[str]) -> Co
         values = numbers(cells)
     if values is None or not said:
         return None
-    return _numeric(name, values, f"column {name!r} is read as numbers, {' and '.join(said)}")
+    note = f"column {name!r} is read as numbers, {' and '.join(said)}"
+    return _numeric(name, values, note, decimal_commas=how == _WITH_COMMAS)
 
 
 def _unit(cell: str) -> str:
@@ -169,11 +244,17 @@ def _with_points(cells: Sequence[str]) -> tuple[list[str], str] | None:
     others = [cell for cell in cells if cell and not is_number(cell)]
     if all(map(_THOUSANDS.fullmatch, others)):
         dropped = re.compile(_SEPARATORS)
-        return [dropped.sub("", cell) for cell in cells], "without their thousands separators"
+        return [dropped.sub("", cell) for cell in cells], _WITHOUT_SEPARATORS
     if all(map(_DECIMAL_COMMA.fullmatch, others)) and not any("." in one for one in _plain(cells)):
         points = [cell.replace(".", "").replace(",", ".") for cell in cells]
-        return points, "with decimal commas"
+        return points, _WITH_COMMAS
+    if all(map(_POINTED.fullmatch, others)) and all(map(_MAYBE_POINTED.fullmatch, _filled(cells))):
+        return [cell.replace(".", "") for cell in cells], _WITHOUT_SEPARATORS
     return None
+
+
+def _filled(cells: Iterable[str]) -> Iterable[str]:
+    return (cell for cell in cells if cell)
 
 
 def _plain(cells: Iterable[str]) -> Iterable[str]:
@@ -202,7 +283,7 @@ def _texts(
     name: str, cells: Sequence[str], distinct: set[str], line: Callable[[int], int]
 ) -> Column | NoFeature:
     filled = sum(map(bool, cells))
-    if len(distinct) > _FEW_TEXTS and len(distinct) > _RECURRING * filled:
+    if len(distinct) > min(max(_FEW_TEXTS, _RECURRING * filled), _MOST_TEXTS):
         return NoFeature(
             f"column {name!r} holds {len(distinct)} different texts in {filled} cells, such as "
             f"{cells[next(i for i, cell in enumerate(cells) if cell)]!r}, and is no feature"

@@ -6,11 +6,9 @@ one event on each of their channels.
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterator, Sequence, Set
+from collections import Counter
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -27,23 +25,26 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.cells import (
+    Column,
     NoFeature,
     codes,
     column,
+    is_maybe_missing,
     is_missing,
     is_number,
     numbers,
 )
-from rebt_ros.storage.dialect import Dialect, dialect_of
+from rebt_ros.storage.column_names import (
+    column_names,
+    label_position,
+    numbers_rows,
+    of_the_actions,
+)
 from rebt_ros.storage.read import Read
-from rebt_ros.storage.text import read_text
+from rebt_ros.storage.records import NoRow, Records, read_records
 
 #: A column of this name holds each row's stamp, in nanoseconds, and is not a feature.
 STAMP = "stamp"
-
-#: Columns of these names, in any case, number or date the rows, and are features only if they are
-#: asked for.
-_NUMBERING = frozenset({STAMP, "time", "timestamp", "index", "unnamed: 0"})
 
 #: A column of the label column's name and this says how each action ended: "success" or "failure".
 #: It is no feature, because it is known only afterwards.
@@ -65,12 +66,12 @@ def read_csv(
     """Reads a CSV table.
 
     Args:
-        path: The file: UTF-8 or UTF-16; cells are separated by commas, or else by semicolons, tabs
-            or bars; one line of column names unless `header` says no.
+        path: The file: UTF-8 or UTF-16; cells are separated by commas, or else by semicolons, tabs,
+            bars or blanks; one line of column names unless `header` says no.
         labels: Columns that hold the actions; without a header their names (`x24`) or indices
-            (`24`); by default the last column.
+            (`24`); by default the column that is called `action`, else the last column.
         header: Whether the first line names the columns (`x0`, `x1`, ... if not).  A first line
-            that holds data all the same is recognised by its numbers and noted.
+            that holds data all the same is recognised by its values and noted.
         row_kind: What a row is; None: an event where a column says how actions ended, else a
             sample.
         features: Columns that are features even where their names say that they number or date the
@@ -89,22 +90,21 @@ def read_csv(
         InputError: The file cannot be read or is not such a table.
     """
     notes: list[str] = []
-    table = _open(path, labels or channels, header, notes, optional=not labels)
+    table = _open(path, labels, channels, header, notes)
     labelled = _labelled(table, notes)
     cells = tuple(zip(*(table.rows[row] for row in labelled), strict=True))
     shown = _Shown(table, labelled, cells)
-    stamps = shown.stamps(notes)
-    left_out = _outcomes(table, notes)
+    stamps = shown.stamps()
+    outcomes = _outcomes(table, notes)
     if row_kind is None:
-        row_kind = RowKind.EVENT if left_out else RowKind.SAMPLE
-    if stamps is not None:
-        left_out.add(STAMP)
-    left_out |= _numbering(table, left_out, features, notes)
-    read, columns = _states(shown, left_out, notes)
+        row_kind = RowKind.EVENT if outcomes else RowKind.SAMPLE
+    known = outcomes if stamps is None else outcomes | {STAMP}
+    left_out = _numbering(shown, known, features, notes)
+    read, columns, unreadable = _states(shown, known | left_out, notes)
     taken, label = shown.events()
     actions, chosen = shown.actions(taken, label)
+    notes += _doubts(actions)
     on_channels, channel = in_sorted_order(table.channels, label)
-    unlabelled = len(table.rows) - len(labelled)
     return Read(
         Demonstration(
             path.name,
@@ -118,76 +118,104 @@ def read_csv(
             row_kind=row_kind,
         ),
         tuple(notes),
-        Account(
-            "rows",
-            len(table.rows),
-            len(labelled),
-            len(taken),
-            {"have no action": unlabelled} if unlabelled else {},
-        ),
+        _account(table, len(labelled), len(taken)),
+        frozenset(left_out | unreadable),
     )
 
 
+def _account(table: _Table, labelled: int, events: int) -> Account:
+    """Where all records of a table went, but for the one that names its columns."""
+    left_out = {reason.several: count for reason, count in table.left_out.items()}
+    if unlabelled := len(table.rows) - labelled:
+        left_out["have no action"] = unlabelled
+    stated = labelled + sum(left_out.values())
+    return Account("rows", stated, labelled, events, left_out)
+
+
 def _open(
-    path: Path, labels: Sequence[str], header: bool, notes: list[str], *, optional: bool
+    path: Path, labels: Sequence[str], channels: Sequence[str], header: bool, notes: list[str]
 ) -> _Table:
-    """The cells of a file, once it is clear whether its first line names the columns.
+    """The cells of a file, once it is clear what its columns are called.
 
     Args:
         path: The file.
         labels: Columns that hold the actions.
+        channels: Columns that do where all of them are there, if `labels` names none.
         header: Whether the first line is said to name the columns.
         notes: Where to note what was found.
-        optional: Whether the label columns count only if all of them are there.
     """
-    text = read_text(path)
-    dialect = dialect_of(text)
-    notes += dialect.notes
-    file = _File(path, text, dialect)
-    records = _records(file)
-    if optional and not set(labels) <= {cell.strip() for cell in records[0]}:
-        labels = ()
-    if header and _first_is_data(records, labels):
-        header = False
-        notes.append("the first line holds data, so the columns are named x0, x1, and so on")
-    table = _table(file, records, labels, header)
+    records = read_records(path)
+    notes += records.notes
+    names = column_names(records, labels or channels, header=header)
+    notes += names.notes
+    if not labels and set(channels) <= set(names.names):
+        labels = channels
+    if names.said:
+        records = records.without([cell.strip() for cell in records.rows[0]])
+    table = _table(records, names.names, labels, notes, said=names.said)
     if not header:
         _refuse_header(table)
-    if any(
-        table.rows[row][one] != table.rows[row][one].strip()
-        for one in table.labels
-        for row in range(len(table.rows))
-    ):
+    notes += _left_out(records)
+    if any(row[one] != row[one].strip() for one in table.labels for row in table.rows):
         notes.append("blanks around actions do not count")
     return table
 
 
+def _left_out(records: Records) -> list[str]:
+    """Sentences on the records that are no rows."""
+    notes = []
+    for reason, count in records.left_out.items():
+        lines = f"{count} lines {reason.several}" if count > 1 else f"1 line {reason.single}"
+        notes.append(f"{lines} and {'are' if count > 1 else 'is'} left out")
+    return notes
+
+
 def _states(
     shown: _Shown, left_out: Set[str], notes: list[str]
-) -> tuple[tuple[Feature, ...], FloatArray]:
-    """The features, and their values in each row (rows x features)."""
+) -> tuple[tuple[Feature, ...], FloatArray, set[str]]:
+    """The features, their values in each row (rows x features), and the columns that are none."""
     table = shown.table
-    found = [
-        one
-        for index, name in enumerate(table.columns)
-        if index not in table.labels and name not in left_out
-        if (one := shown.feature(index, notes)) is not None
+    places = [
+        place
+        for place, name in enumerate(table.columns)
+        if place not in table.labels and name not in left_out
     ]
+    read = {place: shown.column(place) for place in places}
+    if any(isinstance(one, Column) and one.decimal_commas for one in read.values()):
+        # In a table with decimal commas, points stand between groups of three digits.
+        read = {place: shown.column(place, decimal_commas=True) for place in places}
+    found: list[Column] = []
+    unreadable = set()
+    for place, one in read.items():
+        if isinstance(one, NoFeature):
+            notes.append(one.note)
+            unreadable.add(table.columns[place])
+            continue
+        notes += one.notes
+        shown.check_numbers(place, one.values)
+        found.append(one)
     if not found:
         raise InputError(
-            f"{table.file.path} has no column beside the actions that can be a feature: add one "
+            f"{table.path} has no column beside the actions that can be a feature: add one "
             "per value of the state, separated by commas."
         )
-    return tuple(feature for feature, _ in found), np.column_stack([values for _, values in found])
+    return (
+        tuple(one.feature for one in found),
+        np.column_stack([one.values for one in found]),
+        unreadable,
+    )
 
 
-def _numbering(table: _Table, known: Set[str], asked_for: Set[str], notes: list[str]) -> set[str]:
+def _numbering(
+    shown: _Shown, known: Set[str], asked_for: Set[str], notes: list[str]
+) -> frozenset[str]:
     """The columns that number or date the rows, but for those that are known or asked for."""
+    table = shown.table
     found = {
         name
-        for index, name in enumerate(table.columns)
-        if name.lower() in _NUMBERING and index not in table.labels
-        if name not in known and name not in asked_for
+        for place, name in enumerate(table.columns)
+        if place not in table.labels and name not in known and name not in asked_for
+        if numbers_rows(name, shown.cells[place])
     }
     for name in sorted(found):
         integers = (
@@ -196,50 +224,40 @@ def _numbering(table: _Table, known: Set[str], asked_for: Set[str], notes: list[
             else ""
         )
         notes.append(f"column {name!r} numbers or dates the rows and is no feature{integers}")
-    return found
+    return frozenset(found)
 
 
-@dataclass(frozen=True, slots=True)
-class _File:
-    path: Path
-    text: str
-    dialect: Dialect
-
-    def records(self) -> Iterator[tuple[int, list[str]]]:
-        """The line on which each record begins, and its cells; blank lines are left out."""
-        text = io.StringIO(self.text, newline="")
-        text.seek(self.dialect.begin)
-        reader = csv.reader(
-            text,
-            delimiter=self.dialect.delimiter,
-            skipinitialspace=True,
-            strict=True,
-        )
-        line = before = 1 + self.text.count("\n", 0, self.dialect.begin)
-        try:
-            for cells in reader:
-                if any(map(str.strip, cells)):
-                    yield line, cells
-                line = before + reader.line_num
-        except csv.Error as err:
-            raise InputError(
-                f"{self.path}, line {line}: this is not CSV ({err}): check its quotes."
-            ) from err
-
-    def line(self, record: int) -> int:
-        """Where a record begins; counted only for messages, as cells may hold line breaks."""
-        return next(line for line, _ in islice(self.records(), record, None))
+def _doubts(actions: Sequence[str]) -> list[str]:
+    """What a person may not have meant by actions of such names."""
+    notes = [
+        f"{action!r} is taken for an action: leave cells without one empty"
+        for action in actions
+        if is_maybe_missing(action)
+    ]
+    alike: dict[str, list[str]] = {}
+    for action in actions:
+        alike.setdefault(" ".join(action.casefold().split()), []).append(action)
+    return notes + [
+        f"{', '.join(map(repr, same))} are different actions: write them alike if they are one"
+        for same in alike.values()
+        if len(same) > 1
+    ]
 
 
 @dataclass(frozen=True, slots=True)
 class _Table:
-    file: _File
+    path: Path
     columns: tuple[str, ...]
     rows: Sequence[Sequence[str]]
     """Each as long as `columns`."""
+    lines: Sequence[int]
+    """The line on which each row begins."""
     labels: tuple[int, ...]
     """Positions of the columns that hold the actions: one at least, all different."""
-    header: bool
+    said: bool
+    """Whether the first record names the columns."""
+    left_out: Counter[NoRow]
+    """Other records, by what they are."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -247,9 +265,6 @@ class _Table:
         if len(self.labels) == 1:
             return (DEFAULT_CHANNEL,)
         return tuple(self.columns[label] for label in self.labels)
-
-    def line(self, row: int) -> int:
-        return self.file.line(row + self.header)
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,6 +275,9 @@ class _Shown:
     rows: Sequence[int]
     cells: Sequence[Sequence[str]]
     """Column by column."""
+
+    def line(self, row: int) -> int:
+        return self.table.lines[self.rows[row]]
 
     def events(self) -> tuple[IntArray, IntArray]:
         """Where each action stands, row by row: positions in `rows` and in `table.labels`."""
@@ -279,64 +297,60 @@ class _Shown:
         actions = tuple(dict.fromkeys(cells))
         for action in actions:
             if not action.isprintable():
-                row = self.rows[int(taken[cells.index(action)])]
+                line = self.line(int(taken[cells.index(action)]))
                 raise InputError(
-                    f"{self.table.file.path}, line {self.table.line(row)}: the action "
-                    f"{action!r} must consist of printable characters."
+                    f"{self.table.path}, line {line}: the action {action!r} must consist of "
+                    "printable characters."
                 )
         return in_sorted_order(actions, codes(actions, cells))
 
-    def stamps(self, notes: list[str]) -> IntArray | None:
+    def stamps(self) -> IntArray | None:
         """The stamp column; None where there is none."""
         columns = self.table.columns
-        if not self.table.header or STAMP not in columns:
+        if STAMP not in columns or columns.index(STAMP) in self.table.labels:
             return None
-        if columns.index(STAMP) in self.table.labels:
-            return None
-        cells = self.cells[columns.index(STAMP)]
         try:
-            return np.array([int(cell) for cell in cells], dtype=np.int64)
+            return np.array([int(cell) for cell in self.cells[columns.index(STAMP)]], np.int64)
         except (ValueError, OverflowError):
             return None
 
-    def feature(self, place: int, notes: list[str]) -> tuple[Feature, FloatArray] | None:
-        """A feature with its values; None, with a note, where a column is none."""
-        name, cells = self.table.columns[place], self.cells[place]
-        read = column(name, cells, lambda row: self.table.line(self.rows[row]))
-        if isinstance(read, NoFeature):
-            notes.append(read.note)
-            return None
-        notes += read.notes
-        self._check_numbers(name, cells, read.values)
-        return read.feature, read.values
+    def column(self, place: int, *, decimal_commas: bool = False) -> Column | NoFeature:
+        return column(
+            self.table.columns[place],
+            self.cells[place],
+            self.line,
+            decimal_commas=decimal_commas,
+        )
 
-    def _check_numbers(self, name: str, cells: Sequence[str], values: FloatArray) -> None:
+    def check_numbers(self, place: int, values: FloatArray) -> None:
         wrong = np.flatnonzero(np.abs(values) > LARGEST_VALUE)
         if len(wrong):
             raise InputError(
-                f"{self.table.file.path}, line {self.table.line(self.rows[wrong[0]])}: "
-                f"column {name!r} holds {cells[wrong[0]]!r}: numbers must lie within "
-                f"±{LARGEST_VALUE:g}, and a cell without a value must be empty."
+                f"{self.table.path}, line {self.line(wrong[0])}: column "
+                f"{self.table.columns[place]!r} holds {self.cells[place][wrong[0]]!r}: numbers "
+                f"must lie within ±{LARGEST_VALUE:g}, and a cell without a value must be empty."
             )
 
 
-def _table(file: _File, records: list[list[str]], labels: Sequence[str], header: bool) -> _Table:
-    path = file.path
-    columns = (
-        tuple(name.strip() for name in records[0])
-        if header
-        else tuple(f"x{index}" for index in range(len(records[0])))
-    )
+def _table(
+    records: Records,
+    columns: tuple[str, ...],
+    labels: Sequence[str],
+    notes: list[str],
+    *,
+    said: bool,
+) -> _Table:
+    path = records.path
     _check_names(path, columns)
-    for number, record in enumerate(records):
-        if len(record) != len(columns):
+    for cells, line in zip(records.rows, records.lines, strict=True):
+        if len(cells) != len(columns):
             raise InputError(
-                f"{path}, line {file.line(number)}: there are {len(record)} cells where "
+                f"{path}, line {line}: there are {len(cells)} cells where "
                 f"{len(columns)} were expected: quote cells that contain commas."
             )
     positions: list[int] = []
     for label in labels:
-        position = _label_position(columns, label, header)
+        position = label_position(columns, label, said=said)
         if position is None:
             raise InputError(f"{path}: there is no column {label!r}: {_listing(columns)}.")
         if position in positions:
@@ -345,9 +359,40 @@ def _table(file: _File, records: list[list[str]], labels: Sequence[str], header:
                 "name every label column once."
             )
         positions.append(position)
-    if len(records) == header:
+    rows = records.rows[said:]
+    if not rows:
         raise InputError(f"{path} has no rows: record actions together with states first.")
-    return _Table(file, columns, records[header:], tuple(positions) or (len(columns) - 1,), header)
+    if not positions:
+        positions = [_default_label(columns, rows, notes)]
+    return _Table(
+        path, columns, rows, records.lines[said:], tuple(positions), said, records.left_out
+    )
+
+
+def _default_label(columns: Sequence[str], rows: Sequence[Sequence[str]], notes: list[str]) -> int:
+    """The column that is called after the actions; else the last one."""
+    last = len(columns) - 1
+    named = of_the_actions(columns)
+    if named is not None:
+        if named != last:
+            notes.append(f"column {columns[named]!r} is taken for the actions because of its name")
+        return named
+    if all(is_missing(cell) or is_number(cell) for cell in {row[last].strip() for row in rows}):
+        words = next((place for place in range(last) if _holds_words(rows, place)), None)
+        if words is not None:
+            notes.append(
+                f"column {columns[last]!r} is taken for the actions because it is the last, but "
+                f"holds numbers, and {columns[words]!r} holds words: name the label column if it "
+                "is another"
+            )
+    return last
+
+
+def _holds_words(rows: Sequence[Sequence[str]], place: int) -> bool:
+    """Whether a column holds words, and few of them that often recur, as actions do."""
+    cells = {row[place].strip() for row in rows}
+    words = [cell for cell in cells if not is_missing(cell)]
+    return 2 * len(words) <= len(rows) and not any(map(is_number, words))
 
 
 def _labelled(table: _Table, notes: list[str]) -> list[int]:
@@ -358,7 +403,7 @@ def _labelled(table: _Table, notes: list[str]) -> list[int]:
         empty = sum(is_missing(cells[label].strip()) for cells in table.rows)
         if empty == count:
             raise InputError(
-                f"{table.file.path}: column {name!r} holds no action: name the column that does."
+                f"{table.path}: column {name!r} holds no action: name the column that does."
             )
         if not empty:
             continue
@@ -379,15 +424,13 @@ def _labelled(table: _Table, notes: list[str]) -> list[int]:
 def _outcomes(table: _Table, notes: list[str]) -> set[str]:
     """The columns that say how the actions ended."""
     wanted = {table.columns[label] + OUTCOME_SUFFIX for label in table.labels}
-    found = sorted(wanted & set(table.columns)) if table.header else []
+    found = sorted(wanted & set(table.columns))
     notes += [f"column {name!r} says how actions ended and is no feature" for name in found]
     return set(found)
 
 
 def _check_names(path: Path, columns: Sequence[str]) -> None:
     for index, name in enumerate(columns):
-        if not name:
-            raise InputError(f"{path}: column {index + 1} has no name: name it or remove it.")
         if name in columns[:index]:
             raise InputError(
                 f"{path}: two columns are named {name!r} (columns {columns.index(name) + 1} and "
@@ -400,44 +443,6 @@ def _listing(columns: Sequence[str]) -> str:
     return f"the columns are {', '.join(columns[:_LISTED])}{more}"
 
 
-def _label_position(columns: Sequence[str], label: str, header: bool) -> int | None:
-    name = label.strip()
-    if not header and name.isdecimal():
-        name = f"x{int(name)}"
-    return columns.index(name) if name in columns else None
-
-
-def _first_is_data(records: Sequence[Sequence[str]], labels: Sequence[str]) -> bool:
-    """Whether the first record, which should name the columns, holds a row."""
-    first = [cell.strip() for cell in records[0]]
-    if any(label.strip() in first for label in labels):
-        return False
-    names = [f"x{index}" for index in range(len(first))]
-    found = (_label_position(names, label, header=False) for label in labels)
-    positions = {position for position in found if position is not None} or {len(first) - 1}
-    others = [index for index in range(len(first)) if index not in positions]
-    named = [index for index in others if not is_number(first[index])]
-    if len(named) == len(others) or any(_holds_numbers(records, index) for index in named):
-        return False
-    if any(_recurs(records, index) for index in (*positions, *named)):
-        return True
-    # Tables of unnamed columns are often written with their indices as names.
-    return any(first[index] != str(index) for index in others if index not in named)
-
-
-def _recurs(records: Sequence[Sequence[str]], index: int) -> bool:
-    """Whether what stands first in a column stands there once more."""
-    first = records[0][index].strip()
-    return any(index < len(record) and record[index].strip() == first for record in records[1:])
-
-
-def _holds_numbers(records: Sequence[Sequence[str]], index: int) -> bool:
-    """Whether a column holds numbers below its first cell."""
-    below = [record[index].strip() for record in records[1:] if index < len(record)]
-    found = numbers(below)
-    return found is not None and not np.isnan(found).all()
-
-
 def _refuse_header(table: _Table) -> None:
     """Refuses column names where data should be: text above columns of numbers."""
     if len(table.rows) < 2:
@@ -447,24 +452,9 @@ def _refuse_header(table: _Table) -> None:
     if not features or any(not cell or is_number(cell) for cell in first):
         return
     for index, name in zip(features, first, strict=True):
-        if _holds_numbers(table.rows, index):
+        below = numbers([row[index].strip() for row in table.rows[1:]])
+        if below is not None and not np.isnan(below).all():
             raise InputError(
-                f"{table.file.path}: the first line says {name!r} above a column of numbers: "
+                f"{table.path}: the first line says {name!r} above a column of numbers: "
                 "it names the columns, so read the table with a header."
             )
-
-
-def _records(file: _File) -> list[list[str]]:
-    """The records of a file: at least one, of two cells or more."""
-    records = [cells for _, cells in file.records()]
-    if not records:
-        raise InputError(f"{file.path} is empty: name a table with rows.")
-    if all(len(cells) == len(records[0]) and not cells[-1].strip() for cells in records):
-        # Some programs end each line with a separator.
-        records = [cells[:-1] for cells in records]
-    if len(records[0]) < 2:
-        raise InputError(
-            f"{file.path} has a single column: a table needs at least one value of the state and "
-            "an action, separated by commas."
-        )
-    return records

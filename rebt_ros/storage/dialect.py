@@ -1,18 +1,24 @@
-"""How a table is written: what separates its cells, and where it begins."""
+"""How a table is written: what separates and quotes its cells, and where it begins."""
 
 from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 
 #: What may separate cells, the usual one first, with its name.
-_DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
+_DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
 #: Records that tell.
 _FIRST = 50
-_COMMENT = "#"
+
+#: What begins a line of comment.
+COMMENT = "#"
+
+#: The line by which spreadsheets are told what separates cells.
+_SAID = re.compile(r"sep=(?P<delimiter>[,;|\t ])\r?\n", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,34 +26,68 @@ class Dialect:
     """How a table is written."""
 
     delimiter: str
+    quote: str
     begin: int
-    """Where the first record begins: what stands before are comments."""
+    """Where the first record begins: comments may stand before it."""
+    comment: tuple[str, ...]
+    """The cells of the last comment before the table, which may name its columns."""
     notes: tuple[str, ...]
     """How it is read, where that is not plain; no full stops."""
+
+    def records(self, text: str) -> Iterator[tuple[list[str], int]]:
+        """The cells of each record, and how many lines of the table end with it.
+
+        Raises:
+            csv.Error: A quote is not closed, or stands where none can.
+        """
+        lines = io.StringIO(text, newline="")
+        lines.seek(self.begin)
+        reader = csv.reader(
+            lines,
+            delimiter=self.delimiter,
+            quotechar=self.quote,
+            skipinitialspace=True,
+            strict=True,
+        )
+        for cells in reader:
+            yield cells, reader.line_num
 
 
 def dialect_of(text: str) -> Dialect:
     """Tells how a table is written by its first records."""
-    begin = _after_comments(text)
-    comments = text.count("\n", 0, begin)
-    delimiter = _delimiter(text[begin:])
+    said = _SAID.match(text)
+    first = said.end() if said else 0
+    begin = _after_comments(text, first)
+    delimiter = said["delimiter"] if said else _delimiter(text[begin:])
+    quote = _quote(text[begin:], delimiter)
     notes = []
-    if comments:
+    if comments := text.count("\n", first, begin):
         lines = f"{comments} lines of comments are" if comments > 1 else "a line of comments is"
         notes.append(f"{lines} left out before the table")
     if delimiter != ",":
         notes.append(f"cells are separated by {_DELIMITERS[delimiter]}")
-    return Dialect(delimiter, begin, tuple(notes))
+    if quote != '"':
+        notes.append("cells are quoted by single quotes")
+    comment = _last_comment(text[first:begin], delimiter)
+    return Dialect(delimiter, quote, begin, comment, tuple(notes))
 
 
-def _after_comments(text: str) -> int:
-    begin = 0
-    while text.startswith(_COMMENT, begin):
+def _after_comments(text: str, begin: int) -> int:
+    while text.startswith(COMMENT, begin):
         end = text.find("\n", begin)
         if end < 0:
             break
         begin = end + 1
     return begin
+
+
+def _last_comment(comments: str, delimiter: str) -> tuple[str, ...]:
+    lines = comments.splitlines()
+    last = lines[-1].lstrip(COMMENT).strip() if lines else ""
+    try:
+        return tuple(next(_first_records(last, delimiter), ()))
+    except csv.Error:
+        return ()
 
 
 def _delimiter(text: str) -> str:
@@ -61,17 +101,34 @@ def _delimiter(text: str) -> str:
         return ","
     if fitting[0] == ",":
         first = next(_first_records(text, ","))
-        others = [one for one in fitting[1:] if any(one in cell for cell in first)]
+        others = [one for one in fitting[1:] if one != " " and any(one in cell for cell in first)]
         return others[0] if others else ","
     return fitting[0]
 
 
 def _fits(text: str, delimiter: str) -> bool:
     try:
-        counts = {len(cells) for cells in islice(_first_records(text, delimiter), _FIRST)}
+        counts = {
+            len(cells)
+            for cells in islice(_first_records(text, delimiter), _FIRST)
+            if not cells[0].startswith(COMMENT)
+        }
     except csv.Error:
         return False
     return len(counts) == 1 and min(counts) > 1
+
+
+def _quote(text: str, delimiter: str) -> str:
+    """Double quotes, unless all cells of a column are within single ones."""
+    try:
+        _, *records = islice(_first_records(text, delimiter), _FIRST)
+    except (csv.Error, ValueError):
+        return '"'
+    quoted = (
+        all(len(cell) > 1 and cell.startswith("'") and cell.endswith("'") for cell in cells)
+        for cells in zip(*records, strict=False)
+    )
+    return "'" if any(quoted) else '"'
 
 
 def _first_records(text: str, delimiter: str) -> Iterator[list[str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
 
@@ -88,7 +88,7 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     sources = [source for path in inputs for source in _readable_sources(path)]
     _check_distinct([path for path, _ in sources])
     _check_options(options, {kind for _, kind in sources})
-    reads = [_READERS[kind](path, options) for path, kind in sources]
+    reads = _with_common_features([_READERS[kind](path, options) for path, kind in sources])
     return Loaded(
         tuple(read.demonstration for read in reads),
         tuple(
@@ -98,6 +98,28 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         ),
         {read.demonstration.name: read.account for read in reads if read.account},
     )
+
+
+def _with_common_features(reads: Sequence[Read]) -> list[Read]:
+    """Leaves out everywhere which features a table has none of: `Read.no_features`."""
+    nowhere = frozenset[str]().union(*(read.no_features for read in reads))
+    common = []
+    for read in reads:
+        demonstration = read.demonstration
+        names = [feature.name for feature in demonstration.features]
+        kept = [place for place, name in enumerate(names) if name not in nowhere]
+        if not 0 < len(kept) < len(names):
+            common.append(read)
+            continue
+        fewer = replace(
+            demonstration,
+            features=tuple(demonstration.features[place] for place in kept),
+            states=demonstration.states[:, kept],
+        )
+        dropped = ", ".join(repr(name) for name in names if name in nowhere)
+        note = f"no feature in every table, and so left out: {dropped}"
+        common.append(replace(read, demonstration=fewer, notes=(*read.notes, note)))
+    return common
 
 
 def _readable_sources(path: Path) -> tuple[tuple[Path, InputKind], ...]:

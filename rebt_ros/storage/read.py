@@ -17,3 +17,5 @@ class Read:
     """What a person should know about it, such as how many rows were left out; no full stops."""
     account: Account | None = None
     """Where what it holds went."""
+    no_features: frozenset[str] = frozenset()
+    """Columns that hold no feature, which those of other files that are called so may well do."""
