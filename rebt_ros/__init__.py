@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from rebt_ros.decision_tree.upsampling import Upsampling
     from rebt_ros.demonstration.last_action import History
     from rebt_ros.errors import RebtError
-    from rebt_ros.offline import learn, replay
-    from rebt_ros.options import LearnOptions, Use
-    from rebt_ros.policy import Policy
+    from rebt_ros.learning.options import LearnOptions, Use
+    from rebt_ros.learning.policy import Policy
+    from rebt_ros.offline.learn_and_replay import learn, replay
     from rebt_ros.storage.inputs import InputOptions
 
 __all__ = [
@@ -36,15 +36,15 @@ __all__ = [
 _HOMES = {
     "History": "rebt_ros.demonstration.last_action",
     "InputOptions": "rebt_ros.storage.inputs",
-    "LearnOptions": "rebt_ros.options",
+    "LearnOptions": "rebt_ros.learning.options",
     "LearnedTree": "rebt_ros.behavior_tree.learned_tree",
-    "Policy": "rebt_ros.policy",
+    "Policy": "rebt_ros.learning.policy",
     "RebtError": "rebt_ros.errors",
     "Root": "rebt_ros.behavior_tree.learned_tree",
     "Upsampling": "rebt_ros.decision_tree.upsampling",
-    "Use": "rebt_ros.options",
-    "learn": "rebt_ros.offline",
-    "replay": "rebt_ros.offline",
+    "Use": "rebt_ros.learning.options",
+    "learn": "rebt_ros.offline.learn_and_replay",
+    "replay": "rebt_ros.offline.learn_and_replay",
 }
 
 

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Sequence
 import strategies as some
 from hypothesis import strategies as st
 
-from rebt_ros.algorithms.lat_graph import ActionNode, CycleNode, GraphNode, LatGraph
-from rebt_ros.algorithms.lat_occurrences import Runs
-from rebt_ros.algorithms.re_bt_espresso import reduce_floats
-from rebt_ros.algorithms.rules import Rule, in_its_own_words
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.logic.conditions import IsTrue, LastActionIs, Literal
+from rebt_ros.paper.lat_graph import ActionNode, CycleNode, GraphNode, LatGraph
+from rebt_ros.paper.lat_occurrences import Runs
+from rebt_ros.paper.re_bt_espresso import reduce_floats
+from rebt_ros.paper.rules import Rule, in_its_own_words
 
 
 def c(number: int) -> Literal:

@@ -3,7 +3,7 @@
 from py_trees.common import Status
 
 from rebt_ros.behavior_tree.nodes import Action
-from rebt_ros.ros.action_results import ActionResults
+from rebt_ros.live.action_results import ActionResults
 
 GO, TURN = Action("go", "action"), Action("turn", "action")
 

@@ -26,18 +26,13 @@ CHECKOUT: Final = Path(__file__).resolve().parents[1]
 LAYERS: Final = (
     {"commands"},
     {"ros"},
+    {"live"},
     {PACKAGE},  # rebt_ros/__init__.py, the public interface
-    {"offline"},
-    {"family"},
-    {"experiment"},
-    {"pipeline", "replaying"},
-    {"choosing", "report", "suggesting"},
-    {"options", "policy", "selection", "trial"},
-    {"evaluation", "pictures", "reaction_time", "simulation", "storage"},
-    {"algorithms"},
-    {"routines"},
+    {"offline", "study"},
+    {"learning", "trial"},
+    {"storage", "simulated_robot", "drawing", "beyond_the_paper"},
+    {"paper"},
     {"decision_tree"},
-    {"edit_distance"},
     {"behavior_tree"},
     {"demonstration"},
     {"logic"},
@@ -67,21 +62,21 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 #: Libraries with a home: the only modules that import them.
 HOMES: Final = {
     "apsw": ("rebt_ros.storage.bag_safety",),
-    "distributed": ("rebt_ros.experiment.workers",),
+    "distributed": ("rebt_ros.study.workers",),
     "imblearn": ("rebt_ros.decision_tree.upsampling",),
     "jsonschema": (),
-    "joblib": ("rebt_ros.commands.bench_*", "rebt_ros.experiment.workers"),
-    "matplotlib": ("rebt_ros.pictures.*",),
-    "networkx": ("rebt_ros.algorithms.lat_*", "rebt_ros.edit_distance.networkx_worker"),
+    "joblib": ("rebt_ros.commands.bench_*", "rebt_ros.study.workers"),
+    "matplotlib": ("rebt_ros.drawing.*",),
+    "networkx": ("rebt_ros.paper.lat_*", "rebt_ros.study.edit_distance.networkx_worker"),
     "py_trees": (
         "rebt_ros.behavior_tree.runtime",
-        "rebt_ros.ros",
+        "rebt_ros.live.action_results",
         "rebt_ros.ros.*",
-        "rebt_ros.simulation.py_trees_form",
+        "rebt_ros.study.simulator.py_trees_form",
     ),
     "pyeda": ("rebt_ros.logic.minimize",),
     "rosbags": ("rebt_ros.storage", "rebt_ros.storage.*"),
-    "scipy": ("rebt_ros.edit_distance.program", "rebt_ros.edit_distance.relaxation"),
+    "scipy": ("rebt_ros.study.edit_distance.program", "rebt_ros.study.edit_distance.relaxation"),
     "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
 }
 
@@ -269,7 +264,7 @@ def test_offline_commands_need_no_ros(command: str) -> None:
     _run(f"{WITHOUT_ROS} importlib.import_module('rebt_ros.commands.{command}')")
 
 
-@pytest.mark.parametrize("node", ["recorder_node", "executor_node"])
+@pytest.mark.parametrize("node", ["recorder.node", "executor.node"])
 def test_nodes_of_the_robot_load_nothing_that_only_learning_needs(node: str) -> None:
     loaded = _run(f"import sys, rebt_ros.ros.{node}; print(*sys.modules)").split()
     heavy = {"distributed", "imblearn", "jsonschema", "pyeda", "rosbags", "scipy", "sklearn"}

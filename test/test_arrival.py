@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rebt_ros.ros.arrival import ArrivalOrder
+from rebt_ros.live.arrival import ArrivalOrder
 
 
 def test_a_burst_comes_out_in_the_order_of_its_stamps() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands import bench_reduction
-from rebt_ros.experiment.configurations import read_configs
+from rebt_ros.study.configurations import read_configs
 
 CHOICE = {
     "name": "root",

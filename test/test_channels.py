@@ -14,10 +14,10 @@ from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import OptionError
+from rebt_ros.learning.options import LearnOptions
+from rebt_ros.learning.pipeline import learn
+from rebt_ros.learning.replaying import replay
 from rebt_ros.logic.conditions import IsTrue, LastActionIs, Literal
-from rebt_ros.options import LearnOptions
-from rebt_ros.pipeline import learn
-from rebt_ros.replaying import replay
 
 ARM, BASE = "arm/action", "base/action"
 

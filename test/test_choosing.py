@@ -10,20 +10,20 @@ import strategies as some
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rebt_ros import evaluation
-from rebt_ros.algorithms.re_bt_espresso import re_bt_espresso
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
-from rebt_ros.choosing import choose, convert, own_history_choices
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.training import fit, train
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
+from rebt_ros.learning import evaluation
+from rebt_ros.learning.choice import choose, convert, own_history_choices
+from rebt_ros.learning.cross_validation import CrossValidation, JudgedLevels, folds
+from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.logic.conditions import Difference
-from rebt_ros.options import LearnOptions, Use
-from rebt_ros.selection import CrossValidation, JudgedLevels, folds
+from rebt_ros.paper.re_bt_espresso import re_bt_espresso
 
 
 def table(

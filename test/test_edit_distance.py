@@ -24,20 +24,6 @@ from strategies import (
 )
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.edit_distance import bounds as bounds_module
-from rebt_ros.edit_distance import program
-from rebt_ros.edit_distance.bounds import (
-    Bounds,
-    distance_bounds,
-    min_distance,
-    node_mapping,
-)
-from rebt_ros.edit_distance.labelled_tree import LabelledTree, labelled
-from rebt_ros.edit_distance.networkx_measure import (
-    MeasureError,
-    NetworkxMeasure,
-    networkx_distance,
-)
 from rebt_ros.logic.conditions import (
     HasCategory,
     Interval,
@@ -45,6 +31,20 @@ from rebt_ros.logic.conditions import (
     LastActionIs,
     Literal,
     PreviousActionIs,
+)
+from rebt_ros.study.edit_distance import bounds as bounds_module
+from rebt_ros.study.edit_distance import program
+from rebt_ros.study.edit_distance.bounds import (
+    Bounds,
+    distance_bounds,
+    min_distance,
+    node_mapping,
+)
+from rebt_ros.study.edit_distance.labelled_tree import LabelledTree, labelled
+from rebt_ros.study.edit_distance.networkx_measure import (
+    MeasureError,
+    NetworkxMeasure,
+    networkx_distance,
 )
 
 GO, TURN = action("go"), action("turn")

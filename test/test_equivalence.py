@@ -19,15 +19,13 @@ import strategies as some
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rebt_ros.algorithms.priority_root import Reductions, reduced_tree
-from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
-from rebt_ros.algorithms.rules import delta_close, leaf_rules
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
 from rebt_ros.behavior_tree.prediction import States, choose, history_columns, triggered
 from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.beyond_the_paper.priority_root import Reductions, reduced_tree
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import TrainedTree, fit, train
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
@@ -35,6 +33,8 @@ from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import Quantity, Threshold
+from rebt_ros.paper.re_bt_espresso import bt_espresso, re_bt_espresso
+from rebt_ros.paper.rules import delta_close, leaf_rules
 
 FEATURES = (
     Feature("distance"),

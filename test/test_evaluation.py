@@ -10,17 +10,15 @@ import strategies as some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rebt_ros.algorithms.priority_root import reduced_tree
-from rebt_ros.algorithms.re_bt_espresso import re_bt_espresso
-from rebt_ros.algorithms.rules import leaf_rules
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.beyond_the_paper.priority_root import reduced_tree
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import train
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.evaluation import (
+from rebt_ros.learning.evaluation import (
     actions_of,
     agreement,
     decision_tree_choices,
@@ -28,6 +26,8 @@ from rebt_ros.evaluation import (
     teacher_forced_choices,
 )
 from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
+from rebt_ros.paper.re_bt_espresso import re_bt_espresso
+from rebt_ros.paper.rules import leaf_rules
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
 

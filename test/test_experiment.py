@@ -18,11 +18,11 @@ import pytest
 
 from rebt_ros.commands import experiment
 from rebt_ros.errors import OptionError
-from rebt_ros.experiment import workers
-from rebt_ros.experiment.configurations import Lost
-from rebt_ros.experiment.experiment import run_experiment
-from rebt_ros.experiment.settings import Settings
-from rebt_ros.simulation.experiment_config import ExperimentConfig
+from rebt_ros.study import workers
+from rebt_ros.study.configurations import Lost
+from rebt_ros.study.experiment import run_experiment
+from rebt_ros.study.settings import Settings
+from rebt_ros.study.simulator.configuration import ExperimentConfig
 
 MODULE = "rebt_ros.commands.experiment"
 SETTINGS = Settings(ticks=200)
@@ -185,7 +185,7 @@ def test_a_configuration_that_fails_is_lost_and_does_not_stop_the_others(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    from rebt_ros.experiment import running
+    from rebt_ros.study import running
 
     original = running.run_configuration
 
@@ -227,7 +227,7 @@ def test_a_configuration_of_one_action_is_not_compared_and_not_lost(
 def test_a_worker_of_other_versions_is_refused(
     configurations: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from rebt_ros.experiment import running
+    from rebt_ros.study import running
 
     monkeypatch.setattr(running, "fingerprint", lambda settings: "another")
     with pytest.raises(OptionError, match="other versions"):

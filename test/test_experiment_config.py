@@ -11,7 +11,7 @@ import pytest
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.errors import InputError
 from rebt_ros.logic.conditions import Literal, Threshold
-from rebt_ros.simulation.experiment_config import (
+from rebt_ros.study.simulator.configuration import (
     DEEPEST_CONFIGURATION,
     Act,
     Check,

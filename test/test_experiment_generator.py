@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rebt_ros.commands.generate import main
 from rebt_ros.errors import OptionError
-from rebt_ros.simulation.experiment_config import (
+from rebt_ros.study.simulator.configuration import (
     Act,
     Check,
     Group,
@@ -22,8 +22,8 @@ from rebt_ros.simulation.experiment_config import (
     leaves,
     parse_config,
 )
-from rebt_ros.simulation.experiment_file import format_config
-from rebt_ros.simulation.experiment_generator import canonical_form, generate_configs
+from rebt_ros.study.simulator.configuration_file import format_config
+from rebt_ros.study.simulator.generator import canonical_form, generate_configs
 
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "shared" / "experiments"
 SEEDS = st.integers(-(10**9), 10**9)

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from strategies import action, at_most, trees, when
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.edit_distance.bounds import distance_bounds
-from rebt_ros.edit_distance.labelled_tree import labelled
-from rebt_ros.experiment.modes import under_root
-from rebt_ros.experiment.scores import ComparedTree, Distances, comparable, score
 from rebt_ros.logic.conditions import LastActionIs, Literal
+from rebt_ros.study.edit_distance.bounds import distance_bounds
+from rebt_ros.study.edit_distance.labelled_tree import labelled
+from rebt_ros.study.modes import under_root
+from rebt_ros.study.scores import ComparedTree, Distances, comparable, score
 
 GO, TURN, WAIT = action("go"), action("turn"), action("wait")
 TIRED = at_most("battery", 0.2)

@@ -14,7 +14,7 @@ from py_trees.common import Status
 
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import OptionError
-from rebt_ros.simulation.experiment_config import (
+from rebt_ros.study.simulator.configuration import (
     Act,
     Check,
     ExperimentConfig,
@@ -24,14 +24,14 @@ from rebt_ros.simulation.experiment_config import (
     SimulatedNode,
     parse_config,
 )
-from rebt_ros.simulation.experiment_robot import (
+from rebt_ros.study.simulator.py_trees_form import py_trees_form
+from rebt_ros.study.simulator.synthetic_robot import (
     TICK_PERIOD,
     ExperimentBody,
     ExperimentRobot,
     simulate,
 )
-from rebt_ros.simulation.py_trees_form import py_trees_form
-from rebt_ros.simulation.ticking import Outcome, ticker
+from rebt_ros.study.simulator.ticking import Outcome, ticker
 
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "shared" / "experiments"
 

@@ -12,12 +12,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from py_trees.common import Status
 
-from rebt_ros.algorithms.priority_root import ALL_REDUCTIONS, reduced_tree
-from rebt_ros.algorithms.rules import leaf_rules
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.behavior_tree.prediction import States, as_it_stands
 from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.beyond_the_paper.priority_root import ALL_REDUCTIONS, reduced_tree
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import train
 from rebt_ros.decision_tree.tree import DecisionTree, Leaf, Split
@@ -26,6 +25,7 @@ from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import KNOWN, Interval, IsTrue, Literal, Quantity, Threshold
 from rebt_ros.logic.factoring import Factored
 from rebt_ros.logic.intervals import merged, with_intervals
+from rebt_ros.paper.rules import leaf_rules
 
 LOW, HIGH, OTHER = (
     some.at_most("distance", 0.1),

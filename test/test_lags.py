@@ -13,7 +13,6 @@ import strategies as some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rebt_ros import evaluation, offline
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
@@ -24,10 +23,12 @@ from rebt_ros.demonstration.last_action import NO_ACTION
 from rebt_ros.demonstration.schema import LARGEST_LAG, Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, OptionError
+from rebt_ros.learning import evaluation
+from rebt_ros.learning.options import LearnOptions
+from rebt_ros.learning.pipeline import learn, learn_channels
+from rebt_ros.learning.replaying import replay
 from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, Literal, Threshold
-from rebt_ros.options import LearnOptions
-from rebt_ros.pipeline import learn, learn_channels
-from rebt_ros.replaying import replay
+from rebt_ros.offline import learn_and_replay as offline
 
 #: As `some.FEATURES`, but every value can come from a topic.
 FEATURES = (*some.FEATURES[:3], replace(some.FEATURES[3], categories=("0", "1", "2")))

@@ -25,12 +25,12 @@ from lat_examples import (
     shown_runs,
 )
 
-from rebt_ros.algorithms import lat_cycles
-from rebt_ros.algorithms.lat_cycles import Acyclic, CycleStart, remove_cycles
-from rebt_ros.algorithms.lat_graph import ActionNode, CycleNode, LatGraph, generate_graph
-from rebt_ros.algorithms.lat_occurrences import Occurrences, Runs, rows, runs
-from rebt_ros.algorithms.lat_paths import source_to_sink_paths
-from rebt_ros.algorithms.rules import Rule
+from rebt_ros.paper import lat_cycles
+from rebt_ros.paper.lat_cycles import Acyclic, CycleStart, remove_cycles
+from rebt_ros.paper.lat_graph import ActionNode, CycleNode, LatGraph, generate_graph
+from rebt_ros.paper.lat_occurrences import Occurrences, Runs, rows, runs
+from rebt_ros.paper.lat_paths import source_to_sink_paths
+from rebt_ros.paper.rules import Rule
 
 NOTHING = Occurrences(())
 

@@ -29,18 +29,18 @@ from lat_examples import (
 )
 from py_trees.common import Status
 
-from rebt_ros.algorithms.lat_cycles import CycleStart, remove_cycles
-from rebt_ros.algorithms.lat_graph import generate_graph
-from rebt_ros.algorithms.lat_occurrences import Occurrences, Runs
-from rebt_ros.algorithms.lat_trees import Demonstrated, LatTree, LeftOut, gen_lat_trees
-from rebt_ros.algorithms.re_bt_espresso import build_inv_set
-from rebt_ros.algorithms.rules import Rule
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import DEEPEST_TREE
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import LastActionIs, Literal
+from rebt_ros.paper.lat_cycles import CycleStart, remove_cycles
+from rebt_ros.paper.lat_graph import generate_graph
+from rebt_ros.paper.lat_occurrences import Occurrences, Runs
+from rebt_ros.paper.lat_trees import Demonstrated, LatTree, LeftOut, gen_lat_trees
+from rebt_ros.paper.re_bt_espresso import build_inv_set
+from rebt_ros.paper.rules import Rule
 
 CONDITIONS = tuple(Feature(f"C_{number}", FeatureKind.BINARY) for number in range(10))
 
@@ -417,7 +417,7 @@ def test_learning_twice_gives_equal_trees(rules: list[Rule], shown: Runs) -> Non
 #: Prints the trees of rules with competing cycles, PSA groups and many paths.
 IN_ANOTHER_PROCESS = """
 from lat_examples import complete, followers, rule, lat, c
-from rebt_ros.algorithms.lat_trees import gen_lat_trees
+from rebt_ros.paper.lat_trees import gen_lat_trees
 print(gen_lat_trees(complete(7), (tuple("a%d" % (n * n % 31 % 7) for n in range(60)),)))
 print(gen_lat_trees(complete(7)))
 print(gen_lat_trees([rule(("a", "b"), [lat("x"), c(1)]), rule("b", [lat("a")]),

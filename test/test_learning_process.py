@@ -16,7 +16,7 @@ import pytest
 
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.ros.learning_process import (
+from rebt_ros.live.learning_process import (
     LearningCancelledError,
     LearningError,
     LearningProcess,

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import rebt_ros
-from rebt_ros import evaluation, offline, pipeline
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands import learn as learn_command
 from rebt_ros.demonstration.demonstration import Demonstration, Row
@@ -21,8 +20,10 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import OptionError
-from rebt_ros.family.levels import Family
-from rebt_ros.options import LearnOptions, Use
+from rebt_ros.learning import evaluation, pipeline
+from rebt_ros.learning.levels import Family
+from rebt_ros.learning.options import LearnOptions, Use
+from rebt_ros.offline import learn_and_replay as offline
 from rebt_ros.storage.tree_file import read_tree
 
 ALWAYS = ["decision_tree.dot", "decision_tree.svg", "tree.dot", "tree.json", "tree.svg"]
@@ -272,7 +273,7 @@ def test_a_family_that_takes_much_room_says_so(
     table = csv(tmp_path / "table.csv", rows_of(rows=40))
     result = rebt_ros.learn([table], out=tmp_path, options=OPTIONS, levels=True)
     assert "MB" not in " ".join(result.notes)
-    monkeypatch.setattr("rebt_ros.family.files._MENTIONED_MEGABYTES", 0.0)
+    monkeypatch.setattr("rebt_ros.offline.level_files._MENTIONED_MEGABYTES", 0.0)
     result = rebt_ros.learn([table], out=tmp_path, options=OPTIONS, levels=True)
     assert "MB" in " ".join(result.notes)
 

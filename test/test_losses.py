@@ -1,6 +1,6 @@
 """Gaps in the numbers of messages are losses, but only of a topic with one publisher."""
 
-from rebt_ros.ros.losses import Losses
+from rebt_ros.live.losses import Losses
 
 
 def heard(*numbers: int | None, publishers: int = 1, before: int = 1) -> int:

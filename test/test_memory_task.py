@@ -15,9 +15,9 @@ from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.options import LearnOptions
-from rebt_ros.pipeline import learn
-from rebt_ros.policy import Decision, Policy
+from rebt_ros.learning.options import LearnOptions
+from rebt_ros.learning.pipeline import learn
+from rebt_ros.learning.policy import Decision, Policy
 
 #: What is measured: where it is, and something that does not matter.
 FEATURES = (Feature("place", topic="state", index=0), Feature("noise", topic="state", index=1))

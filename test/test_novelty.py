@@ -26,9 +26,9 @@ from rebt_ros.decision_tree.shown_rows import shown_rows
 from rebt_ros.decision_tree.training import train
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.learning.options import LearnOptions
+from rebt_ros.learning.pipeline import learn_from
 from rebt_ros.logic.conditions import Difference
-from rebt_ros.options import LearnOptions
-from rebt_ros.pipeline import learn_from
 
 X, Y = Feature("x", topic="state", index=0), Feature("y", topic="state", index=1)
 KIND = Feature("kind", FeatureKind.CATEGORICAL, ("3", "7"), topic="state", index=2)

@@ -6,15 +6,15 @@ import strategies as some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rebt_ros.algorithms.priority_root import size_of
-from rebt_ros.algorithms.re_bt_espresso import rule_tree
-from rebt_ros.algorithms.rules import FactoredRule
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.beyond_the_paper.priority_root import size_of
 from rebt_ros.logic.dnf import Dnf, conditions_of
 from rebt_ros.logic.factoring import factored, named, pulled_out
 from rebt_ros.logic.float_reduction import implied_literals, implies, reduced
 from rebt_ros.logic.intervals import enclosing_literals, with_intervals
 from rebt_ros.logic.numbered import Numbering, mask
+from rebt_ros.paper.re_bt_espresso import rule_tree
+from rebt_ros.paper.rules import FactoredRule
 
 
 @given(some.dnfs())

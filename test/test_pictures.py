@@ -14,12 +14,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.drawing import Drawing, Node, Page, Text, text_width
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
-from rebt_ros.behavior_tree.picture import behavior_tree_page
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
+from rebt_ros.drawing import png
+from rebt_ros.drawing.accuracy_plot import AccuracyCurve, PlotFormat, render_accuracy_plot
+from rebt_ros.drawing.decision_tree_dot import render_decision_tree_dot
+from rebt_ros.drawing.decision_tree_picture import decision_tree_page
+from rebt_ros.drawing.decision_tree_svg import render_decision_tree_svg
+from rebt_ros.drawing.errors import MatplotlibMissingError, PictureTooLargeError
+from rebt_ros.drawing.shapes import Drawing, Node, Page, Text, text_width
+from rebt_ros.drawing.tree_picture import behavior_tree_page
+from rebt_ros.drawing.tree_png import render_decision_tree_png, render_png
 from rebt_ros.logic.conditions import (
     Difference,
     IsTrue,
@@ -28,13 +35,6 @@ from rebt_ros.logic.conditions import (
     PreviousActionIs,
     Threshold,
 )
-from rebt_ros.pictures import png
-from rebt_ros.pictures.accuracy_plot import AccuracyCurve, PlotFormat, render_accuracy_plot
-from rebt_ros.pictures.decision_tree_dot import render_decision_tree_dot
-from rebt_ros.pictures.decision_tree_picture import decision_tree_page
-from rebt_ros.pictures.decision_tree_svg import render_decision_tree_svg
-from rebt_ros.pictures.errors import MatplotlibMissingError, PictureTooLargeError
-from rebt_ros.pictures.tree_png import render_decision_tree_png, render_png
 
 SVG = "{http://www.w3.org/2000/svg}"
 GO, TURN = nodes.Action("go", "action"), nodes.Action("turn", "action")

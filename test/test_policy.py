@@ -21,6 +21,7 @@ from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.lags import with_lags
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError, RebtError
+from rebt_ros.learning.policy import Decision, Policy
 from rebt_ros.logic.conditions import (
     Condition,
     Difference,
@@ -31,7 +32,6 @@ from rebt_ros.logic.conditions import (
     PreviousActionIs,
     Threshold,
 )
-from rebt_ros.policy import Decision, Policy
 from rebt_ros.storage.tree_file import write_tree
 
 GO, GRASP, TURN, WAIT = some.ACTIONS

@@ -12,7 +12,6 @@ import strategies as some
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from rebt_ros import reaction_time
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import FittedTree, fit
 from rebt_ros.demonstration.last_action import (
@@ -24,7 +23,8 @@ from rebt_ros.demonstration.last_action import (
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
-from rebt_ros.reaction_time import ReactionTime, Trial, estimate, rows_in, shifted
+from rebt_ros.learning import reaction_time
+from rebt_ros.learning.reaction_time import ReactionTime, Trial, estimate, rows_in, shifted
 
 X = (Feature("x"), Feature("noise"))
 LEFT, RIGHT, STAY = 0, 1, 2

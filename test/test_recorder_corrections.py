@@ -18,8 +18,8 @@ from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import NO_ACTION
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
-from rebt_ros.pipeline import learn_from
-from rebt_ros.ros.recording_session import RecordingSession
+from rebt_ros.learning.pipeline import learn_from
+from rebt_ros.live.recording_session import RecordingSession
 from rebt_ros.storage.inputs import load
 from rebt_ros.storage.recording import RecordingWriter, recordings
 from rebt_ros.storage.recording_head import Origin, read_head

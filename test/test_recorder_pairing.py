@@ -15,7 +15,7 @@ import rclpy
 from ros_processes import own_domain, wait_until
 from std_msgs.msg import Float64MultiArray, String
 
-from rebt_ros.ros.recorder_node import RecorderNode
+from rebt_ros.ros.recorder.node import RecorderNode
 from rebt_ros.storage.recording import read_recording
 
 MS = 1_000_000

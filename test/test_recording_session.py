@@ -10,8 +10,8 @@ from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError, RebtError
-from rebt_ros.ros import recording_session
-from rebt_ros.ros.recording_session import RecordingSession
+from rebt_ros.live import recording_session
+from rebt_ros.live.recording_session import RecordingSession
 from rebt_ros.storage.recording_head import Origin
 
 

@@ -13,9 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.dot import render_dot
-from rebt_ros.behavior_tree.figures import PALETTE
-from rebt_ros.behavior_tree.layout import Box, Layout, outline, top_down
 from rebt_ros.behavior_tree.learned_tree import (
     Figures,
     LearnedTree,
@@ -24,10 +21,13 @@ from rebt_ros.behavior_tree.learned_tree import (
     Suggestion,
     SuggestionKind,
 )
-from rebt_ros.behavior_tree.svg import render_svg
-from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
+from rebt_ros.drawing.dot import render_dot
+from rebt_ros.drawing.layout import Box, Layout, outline, top_down
+from rebt_ros.drawing.node_figures import PALETTE
+from rebt_ros.drawing.svg import render_svg
+from rebt_ros.drawing.text import render_text
 from rebt_ros.logic.conditions import (
     Difference,
     Interval,

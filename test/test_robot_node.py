@@ -17,10 +17,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_processes import NodeProcess, Peer
 from std_msgs.msg import Float64MultiArray, String
 
-from rebt_ros.simulation.demonstrator import decide
-from rebt_ros.simulation.episode import run_episode
-from rebt_ros.simulation.robot import Robot, State
-from rebt_ros.simulation.world import furnished_room
+from rebt_ros.simulated_robot.demonstrator import decide
+from rebt_ros.simulated_robot.episode import run_episode
+from rebt_ros.simulated_robot.robot import Robot, State
+from rebt_ros.simulated_robot.world import furnished_room
 
 EPISODES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 

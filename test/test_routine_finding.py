@@ -16,18 +16,19 @@ from py_trees.common import Status
 from rebt_ros.behavior_tree import document, nodes
 from rebt_ros.behavior_tree.learned_tree import Suggestion, SuggestionKind
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
+from rebt_ros.beyond_the_paper.routines.finding import FoundRoutine, find_routines
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
-from rebt_ros.edit_distance.bounds import min_distance
-from rebt_ros.edit_distance.labelled_tree import labelled
-from rebt_ros.experiment.words import one_line
+from rebt_ros.learning.options import LearnOptions, Use
+from rebt_ros.learning.pipeline import Learning, learn_from
+from rebt_ros.learning.suggesting import routines_of, suggest
 from rebt_ros.logic.conditions import Threshold
-from rebt_ros.options import LearnOptions, Use
-from rebt_ros.pipeline import Learning, learn_from
-from rebt_ros.routines.finding import FoundRoutine, find_routines
-from rebt_ros.simulation.experiment_config import (
+from rebt_ros.storage.csv_table import read_csv
+from rebt_ros.study.edit_distance.bounds import min_distance
+from rebt_ros.study.edit_distance.labelled_tree import labelled
+from rebt_ros.study.simulator.configuration import (
     Act,
     Check,
     ExperimentConfig,
@@ -38,9 +39,8 @@ from rebt_ros.simulation.experiment_config import (
     as_behavior_tree,
     parse_config,
 )
-from rebt_ros.simulation.experiment_robot import ExperimentRobot, simulate
-from rebt_ros.storage.csv_table import read_csv
-from rebt_ros.suggesting import routines_of, suggest
+from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, simulate
+from rebt_ros.study.words import one_line
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 SCITOS = SHARED / "data" / "scitos_g5_24.csv"

@@ -16,15 +16,12 @@ from hypothesis import strategies as st
 from rebt_ros.arrays import BoolArray, FloatArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import States, triggered
-from rebt_ros.demonstration.schema import Feature
-from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, Literal, Threshold
-from rebt_ros.routines.corpus import LONGEST_WORD, Corpus, corpus
-from rebt_ros.routines.guards import Guard, guard, holds
-from rebt_ros.routines.likelihood import _PRICE, Model, Models
-from rebt_ros.routines.moments import Word, moments
-from rebt_ros.routines.moves import MOST_STATES, neighbours
-from rebt_ros.routines.program import (
+from rebt_ros.beyond_the_paper.routines.corpus import LONGEST_WORD, Corpus, corpus
+from rebt_ros.beyond_the_paper.routines.guards import Guard, guard, holds
+from rebt_ros.beyond_the_paper.routines.likelihood import _PRICE, Model, Models
+from rebt_ros.beyond_the_paper.routines.moments import Word, moments
+from rebt_ros.beyond_the_paper.routines.moves import MOST_STATES, neighbours
+from rebt_ros.beyond_the_paper.routines.program import (
     Program,
     Routine,
     Step,
@@ -34,7 +31,10 @@ from rebt_ros.routines.program import (
     states_needed,
     tidy,
 )
-from rebt_ros.routines.search import fold
+from rebt_ros.beyond_the_paper.routines.search import fold
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, Literal, Threshold
 
 X = Feature("x")
 A, B, C, D = range(4)

@@ -26,7 +26,7 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, Suggest
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import DocumentError, RebtError
-from rebt_ros.family.files import channel_directories, write_behavior_tree
+from rebt_ros.offline.level_files import channel_directories, write_behavior_tree
 from rebt_ros.storage.recording import RecordingWriter, read_recording
 
 # --- what the source says ---------------------------------------------------------------------

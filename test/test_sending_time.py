@@ -9,8 +9,8 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from rebt_ros.ros import sending_time
-from rebt_ros.ros.sending_time import PairBy, SendingTime
+from rebt_ros.ros.recorder import sending_time
+from rebt_ros.ros.recorder.sending_time import PairBy, SendingTime
 
 HERE, THERE = b"\x01\x0f\x78\xfd", b"\x01\x0f\x12\x34"
 

@@ -22,8 +22,8 @@ from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from ros_processes import NodeProcess, command_of, own_domain, wait_until
 
 from rebt_ros.ros.entry import NODES
-from rebt_ros.simulation.experiment_config import Act, Check, Group, GroupKind
-from rebt_ros.simulation.experiment_file import format_config
+from rebt_ros.study.simulator.configuration import Act, Check, Group, GroupKind
+from rebt_ros.study.simulator.configuration_file import format_config
 
 MOMENTS = int(os.environ.get("REBT_ROS_SIGNALS", "2"))
 

@@ -12,14 +12,15 @@ import pytest
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from rebt_ros import offline
 from rebt_ros.commands.simulate import main
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.fields import Dimension, dimension_labels_of, fields_of
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import tabulate
-from rebt_ros.options import LearnOptions, Use
-from rebt_ros.simulation.experiment_config import (
+from rebt_ros.learning.options import LearnOptions, Use
+from rebt_ros.offline import learn_and_replay as offline
+from rebt_ros.storage.inputs import load
+from rebt_ros.study.simulator.configuration import (
     Act,
     Check,
     Group,
@@ -27,9 +28,8 @@ from rebt_ros.simulation.experiment_config import (
     Inverted,
     parse_config,
 )
-from rebt_ros.simulation.experiment_file import format_config
-from rebt_ros.simulation.experiment_robot import ExperimentRobot, SimulatedRun, simulate
-from rebt_ros.storage.inputs import load
+from rebt_ros.study.simulator.configuration_file import format_config
+from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, SimulatedRun, simulate
 
 SEQUENCE, SELECTOR, PARALLEL = GroupKind.SEQUENCE, GroupKind.SELECTOR, GroupKind.PARALLEL
 X, Y = Check("/x", 0.6, 0.9), Check("/y", 0.3)

@@ -15,11 +15,11 @@ from sklearn.tree import DecisionTreeClassifier
 from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.pipeline import learn
-from rebt_ros.simulation.demonstrator import ENOUGH, decide
-from rebt_ros.simulation.episode import EpisodeResult, Policy, run_episode
-from rebt_ros.simulation.robot import TIME_STEP, Action, Robot, State
-from rebt_ros.simulation.world import Obstacle, Point, World, furnished_room
+from rebt_ros.learning.pipeline import learn
+from rebt_ros.simulated_robot.demonstrator import ENOUGH, decide
+from rebt_ros.simulated_robot.episode import EpisodeResult, Policy, run_episode
+from rebt_ros.simulated_robot.robot import TIME_STEP, Action, Robot, State
+from rebt_ros.simulated_robot.world import Obstacle, Point, World, furnished_room
 
 WORLD = furnished_room()
 TIME_LIMIT = 60.0

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rebt_ros.ros.arrival import LAST
-from rebt_ros.ros.state_streams import StateStreams
+from rebt_ros.live.arrival import LAST
+from rebt_ros.live.state_streams import StateStreams
 
 SECOND = 1_000_000_000
 PATIENCE = 10 * SECOND

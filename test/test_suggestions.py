@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from lat_examples import c, followers, rule
 from test_lat_trees import CONDITIONS, Script, repeater, run, sequence
 
-from rebt_ros.algorithms.lat_trees import gen_lat_trees
-from rebt_ros.algorithms.suggestions import (
+from rebt_ros.behavior_tree import document, nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root, Suggestion, SuggestionKind
+from rebt_ros.errors import OptionError
+from rebt_ros.learning.suggestions import (
     ALL,
     PsaChoice,
     attach,
@@ -22,9 +24,7 @@ from rebt_ros.algorithms.suggestions import (
     psa_suggestions,
     resolve,
 )
-from rebt_ros.behavior_tree import document, nodes
-from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root, Suggestion, SuggestionKind
-from rebt_ros.errors import OptionError
+from rebt_ros.paper.lat_trees import gen_lat_trees
 
 RULES = [
     rule("a", [c(0)], support=3),

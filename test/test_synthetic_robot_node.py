@@ -13,10 +13,11 @@ pytest.importorskip("rclpy")
 from ros_processes import NodeProcess, Peer, values_of
 from std_msgs.msg import Bool, Float64MultiArray, String
 
-from rebt_ros import offline
 from rebt_ros.demonstration.last_action import History
-from rebt_ros.options import LearnOptions, Use
-from rebt_ros.simulation.experiment_config import (
+from rebt_ros.learning.options import LearnOptions, Use
+from rebt_ros.offline import learn_and_replay as offline
+from rebt_ros.storage.inputs import load
+from rebt_ros.study.simulator.configuration import (
     Act,
     Check,
     Group,
@@ -24,9 +25,8 @@ from rebt_ros.simulation.experiment_config import (
     Inverted,
     parse_config,
 )
-from rebt_ros.simulation.experiment_file import format_config
-from rebt_ros.simulation.experiment_robot import ExperimentRobot, SimulatedRun, simulate
-from rebt_ros.storage.inputs import load
+from rebt_ros.study.simulator.configuration_file import format_config
+from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, SimulatedRun, simulate
 
 #: Several actions in a tick, repeats, and actions that fail.
 TREE = Group(

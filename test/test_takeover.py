@@ -11,10 +11,10 @@ import strategies as some
 from rebt_ros.behavior_tree.novelty import Departure, NoveltyDetector
 from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.ros.background import Background
-from rebt_ros.ros.novelty_guard import Novelty, NoveltyGuard
-from rebt_ros.ros.takeover import Takeover, channel_of
-from rebt_ros.ros.takeover_watch import TakeoverWatch
+from rebt_ros.live.background import Background
+from rebt_ros.live.novelty_guard import Novelty, NoveltyGuard
+from rebt_ros.live.takeover import Takeover, channel_of
+from rebt_ros.live.takeover_watch import TakeoverWatch
 
 SECOND = 10**9
 

@@ -9,8 +9,8 @@ from rebt_ros.behavior_tree.nodes import Action, Condition, Selector, Sequence
 from rebt_ros.demonstration.builder import BadMessageError, Fault
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.live.tree_inputs import Message, TreeInputs
 from rebt_ros.logic.conditions import HasCategory, LastActionIs, Literal, Threshold
-from rebt_ros.ros.tree_inputs import Message, TreeInputs
 
 GO, TURN = Action("go", "action"), Action("turn", "action")
 

@@ -9,7 +9,6 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from rebt_ros import pipeline
 from rebt_ros.decision_tree import training
 from rebt_ros.decision_tree.encoding import MISSING, Indicator, Number, Vocabulary, columns, encode
 from rebt_ros.decision_tree.training import fit, train
@@ -18,8 +17,9 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
+from rebt_ros.learning import pipeline
+from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.logic.conditions import Difference, HasCategory, LastActionIs, PreviousActionIs
-from rebt_ros.options import LearnOptions, Use
 
 ROOMS = ("hall", "kitchen", "lab")
 FEATURES = (

@@ -7,7 +7,7 @@ from rebt_ros.behavior_tree.nodes import Action, Condition, Node, Selector, Sequ
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import IsTrue, Literal, Threshold
-from rebt_ros.simulation.robot import State
+from rebt_ros.simulated_robot.robot import State
 
 GO, LEFT, RIGHT, CHARGE = (
     Action(label, "action") for label in ("go", "turn_left", "turn_right", "charge")

@@ -17,10 +17,8 @@ from typing import Any
 import joblib
 import numpy as np
 
-from rebt_ros.algorithms.priority_root import reduced_tree
-from rebt_ros.algorithms.re_bt_espresso import bt_espresso, re_bt_espresso
-from rebt_ros.algorithms.rules import leaf_rules
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.beyond_the_paper.priority_root import reduced_tree
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import aligned, parse, run
 from rebt_ros.decision_tree.encoding import Vocabulary
@@ -29,13 +27,15 @@ from rebt_ros.decision_tree.tree import DecisionTree, Leaf
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
-from rebt_ros.evaluation import teacher_forced_choices
-from rebt_ros.experiment.configurations import read_configs
-from rebt_ros.experiment.reduction import Reductions, Size, SizeComparison
-from rebt_ros.experiment.settings import MAX_DEPTH
-from rebt_ros.simulation.experiment_config import ExperimentConfig
-from rebt_ros.simulation.experiment_robot import TICKS, ExperimentRobot, simulate
+from rebt_ros.learning.evaluation import teacher_forced_choices
+from rebt_ros.paper.re_bt_espresso import bt_espresso, re_bt_espresso
+from rebt_ros.paper.rules import leaf_rules
 from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.study.configurations import read_configs
+from rebt_ros.study.reduction import Reductions, Size, SizeComparison
+from rebt_ros.study.settings import MAX_DEPTH
+from rebt_ros.study.simulator.configuration import ExperimentConfig
+from rebt_ros.study.simulator.synthetic_robot import TICKS, ExperimentRobot, simulate
 
 _MODES: dict[str, Callable[[DecisionTree], nodes.Node]] = {
     "paper": lambda tree: re_bt_espresso(tree, delta=0.0),

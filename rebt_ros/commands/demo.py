@@ -35,11 +35,11 @@ from std_srvs.srv import SetBool, Trigger
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import loads
-from rebt_ros.behavior_tree.svg import render_svg
-from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.commands.shell import aligned, directory, parse, run, use_color
+from rebt_ros.drawing.svg import render_svg
+from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import RebtError
-from rebt_ros.simulation.demonstrator import ENOUGH
+from rebt_ros.simulated_robot.demonstrator import ENOUGH
 from rebt_ros.storage.atomic import write_text_atomically
 
 #: Starts of the robot that are never shown.

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import aligned, directory, parse, run
-from rebt_ros.experiment.experiment import Chosen, run_experiment
-from rebt_ros.experiment.report import Report, rows_of_table
-from rebt_ros.experiment.settings import Settings
+from rebt_ros.study.experiment import Chosen, run_experiment
+from rebt_ros.study.report import Report, rows_of_table
+from rebt_ros.study.settings import Settings
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

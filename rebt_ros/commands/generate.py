@@ -8,9 +8,9 @@ from pathlib import Path
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import add_seed, directory, parse, run
 from rebt_ros.errors import OptionError
-from rebt_ros.simulation.experiment_file import format_config
-from rebt_ros.simulation.experiment_generator import generate_configs
 from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.study.simulator.configuration_file import format_config
+from rebt_ros.study.simulator.generator import generate_configs
 
 #: Share of the work that is done once the configurations are drawn; the rest is writing.
 _DRAWN = 0.2

@@ -6,9 +6,9 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from rebt_ros import offline
 from rebt_ros.commands.shell import add_input_options, aligned, input_options, parse, run
-from rebt_ros.replaying import Disagreement, Replay
+from rebt_ros.learning.replaying import Disagreement, Replay
+from rebt_ros.offline import learn_and_replay
 
 #: Recordings whose rows lie closer have no clock, as CSV tables (seconds).
 _NO_CLOCK = 1e-3
@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _replay(parsed: argparse.Namespace) -> None:
-    results = offline.replay(parsed.tree, parsed.inputs, reading=input_options(parsed))
+    results = learn_and_replay.replay(parsed.tree, parsed.inputs, reading=input_options(parsed))
     for place, result in enumerate(results):
         if place:
             print()

@@ -6,13 +6,13 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from rebt_ros.behavior_tree.dot import render_dot
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.svg import render_svg
-from rebt_ros.behavior_tree.text import render_text
 from rebt_ros.commands.shell import parse, run, use_color
+from rebt_ros.drawing.dot import render_dot
+from rebt_ros.drawing.svg import render_svg
+from rebt_ros.drawing.text import render_text
+from rebt_ros.drawing.tree_png import render_png
 from rebt_ros.errors import OptionError
-from rebt_ros.pictures.tree_png import render_png
 from rebt_ros.storage.atomic import write_bytes_atomically
 from rebt_ros.storage.tree_file import read_tree
 

@@ -14,8 +14,12 @@ from typing import Any
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import add_seed, aligned, directory, parse, run
 from rebt_ros.errors import InputError
-from rebt_ros.simulation.experiment_config import ExperimentConfig, parse_config
-from rebt_ros.simulation.experiment_robot import (
+from rebt_ros.storage.atomic import StorageError, write_text_atomically
+from rebt_ros.storage.bag_writer import BagStorage, new_bag
+from rebt_ros.storage.csv_writer import write_csv
+from rebt_ros.storage.text import read_text
+from rebt_ros.study.simulator.configuration import ExperimentConfig, parse_config
+from rebt_ros.study.simulator.synthetic_robot import (
     REPEATS,
     RUNNING_CHANCE,
     TICKS,
@@ -26,10 +30,6 @@ from rebt_ros.simulation.experiment_robot import (
     published_variables,
     simulate,
 )
-from rebt_ros.storage.atomic import StorageError, write_text_atomically
-from rebt_ros.storage.bag_writer import BagStorage, new_bag
-from rebt_ros.storage.csv_writer import write_csv
-from rebt_ros.storage.text import read_text
 
 _TABLE, _BAG, _SUMMARY = "table.csv", "bag", "summary.json"
 

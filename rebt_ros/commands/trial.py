@@ -23,7 +23,7 @@ from rebt_ros.trial.result import TrialResult, as_json, table, verdict
 from rebt_ros.trial.settings import DEFAULT_TIME_LIMIT, StartParameter, TrialSettings
 
 if TYPE_CHECKING:
-    from rebt_ros.ros.trial_driving import Driving
+    from rebt_ros.ros.trial.driving import Driving
 
 _ROS_ARGUMENTS = "--ros-args"
 _EPISODES = 20
@@ -171,7 +171,7 @@ class _Command:
             RebtError: The trial cannot go on.
         """
         try:
-            from rebt_ros.ros.trial_driving import driving
+            from rebt_ros.ros.trial.driving import driving
         except ImportError as err:
             raise TrialError(
                 f"a trial needs ROS 2, and {err.name or 'a part of it'} cannot be imported: "

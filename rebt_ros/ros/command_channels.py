@@ -14,7 +14,7 @@ from std_msgs.msg import String
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.errors import DocumentError
-from rebt_ros.ros.action_results import ActionResults
+from rebt_ros.live.action_results import ActionResults
 
 #: Of the topic on which the executor says whether it drives; who comes later hears the latest.
 DRIVING_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -17,7 +17,15 @@ from rebt_ros import streams
 STOP_SIGNALS = frozenset({signal.SIGINT, signal.SIGTERM})
 """What ends a node, in order and with exit code 0."""
 
-NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
+_MODULES = {
+    "demonstrator": "robots.demonstrator",
+    "executor": "executor.node",
+    "learner": "learner.node",
+    "recorder": "recorder.node",
+    "robot": "robots.robot",
+    "synthetic_robot": "robots.synthetic_robot",
+}
+NODES = tuple(_MODULES)
 
 
 def demonstrator() -> None:
@@ -56,7 +64,7 @@ def _run(node: str) -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
     streams.prepare()
     try:
-        importlib.import_module(f"rebt_ros.ros.{node}_node").main()
+        importlib.import_module(f"rebt_ros.ros.{_MODULES[node]}").main()
     finally:
         # Python gives handled signals their default effect, death, before it has ended.
         for one in STOP_SIGNALS:

@@ -21,8 +21,8 @@ from sklearn.tree import DecisionTreeClassifier
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.decision_tree.encoding import encode
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.options import DEFAULTS, LearnOptions
-from rebt_ros.pipeline import learn_from
+from rebt_ros.learning.options import DEFAULTS, LearnOptions
+from rebt_ros.learning.pipeline import learn_from
 
 
 @dataclass(frozen=True, slots=True)

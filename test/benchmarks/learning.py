@@ -25,12 +25,12 @@ from running import State, by_hand
 from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.choosing import convert
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, encode
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.options import DEFAULTS, LearnOptions
-from rebt_ros.pipeline import learn_from
+from rebt_ros.learning.choice import convert
+from rebt_ros.learning.options import DEFAULTS, LearnOptions
+from rebt_ros.learning.pipeline import learn_from
 
 _LEARNER = Path(__file__).with_name("learner.py")
 #: Seconds after which a worst case has failed.

@@ -12,14 +12,14 @@ from py_trees.common import Status
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import States, choose, history_columns
 from rebt_ros.behavior_tree.runtime import TreeRuntime
-from rebt_ros.choosing import convert
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, encode
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import History
-from rebt_ros.evaluation import actions_of
+from rebt_ros.learning.choice import convert
+from rebt_ros.learning.evaluation import actions_of
+from rebt_ros.learning.options import DEFAULTS, LearnOptions, Use
+from rebt_ros.learning.pipeline import Learning, learn_from
 from rebt_ros.logic.conditions import Interval, Threshold
-from rebt_ros.options import DEFAULTS, LearnOptions, Use
-from rebt_ros.pipeline import Learning, learn_from
 
 
 class State:

@@ -13,13 +13,13 @@ from xml.etree import ElementTree
 from fuzz import corpus
 from fuzz.mutation import mutated_bytes, mutated_json, mutated_text
 from rebt_ros.behavior_tree.document import dumps, loads
-from rebt_ros.behavior_tree.dot import render_dot
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
-from rebt_ros.behavior_tree.svg import render_svg
-from rebt_ros.behavior_tree.text import render_text
-from rebt_ros.simulation.experiment_config import as_behavior_tree, parse_config
+from rebt_ros.drawing.dot import render_dot
+from rebt_ros.drawing.svg import render_svg
+from rebt_ros.drawing.text import render_text
 from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.inputs import InputOptions, Loaded, load
+from rebt_ros.study.simulator.configuration import as_behavior_tree, parse_config
 
 
 @dataclass(frozen=True, slots=True)

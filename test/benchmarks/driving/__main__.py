@@ -26,8 +26,8 @@ from driving.demonstrating import MOST_SETS, Demonstrator
 from driving.report import Measured, corrections_report, report
 from driving.results import entries
 from rebt_ros.commands.shell import run
+from rebt_ros.drawing.errors import MatplotlibMissingError
 from rebt_ros.errors import OptionError
-from rebt_ros.pictures.errors import MatplotlibMissingError
 from rebt_ros.storage.atomic import write_text_atomically
 
 _CHECKOUT = Path(__file__).resolve().parents[3]

@@ -17,12 +17,12 @@ from driving.demonstrating import Shown, write_tables
 from driving.episodes import Driver
 from driving.plain import PlainDriver
 from driving.task import Task
-from rebt_ros.algorithms.re_bt_espresso import bt_espresso
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Figures
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.table import tabulate
-from rebt_ros.pipeline import as_learned
+from rebt_ros.learning.pipeline import as_learned
+from rebt_ros.paper.re_bt_espresso import bt_espresso
 from rebt_ros.storage.inputs import load
 
 #: Of the plain trees that are not grown fully, of BT-Espresso's and of the paper's.

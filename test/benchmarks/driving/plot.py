@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from driving.results import Entry, entries, grouped
-from rebt_ros.pictures.png import matplotlib_defaults
+from rebt_ros.drawing.png import matplotlib_defaults
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from driving.task import State
-from rebt_ros.simulation.demonstrator import decide
-from rebt_ros.simulation.episode import Episode
-from rebt_ros.simulation.robot import Action, Robot
-from rebt_ros.simulation.robot import State as Measured
-from rebt_ros.simulation.world import furnished_room
+from rebt_ros.simulated_robot.demonstrator import decide
+from rebt_ros.simulated_robot.episode import Episode
+from rebt_ros.simulated_robot.robot import Action, Robot
+from rebt_ros.simulated_robot.robot import State as Measured
+from rebt_ros.simulated_robot.world import furnished_room
 
 #: Simulated seconds.
 _TIME_LIMIT = 60.0

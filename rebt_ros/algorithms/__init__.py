@@ -1,1 +1,0 @@
-"""The paper: RE:BT-Espresso as functions that read like its pseudo-code."""

@@ -1,0 +1,210 @@
+"""Past the paper: smaller trees with the same behavior.
+
+Infeasible combinations of conditions are don't-cares, factoring is repeated, the children of a
+Selector root stand in order of priority, and two thresholds are one interval.
+
+Under the paper's root each rule must hold in exactly its own states.  Under a Selector a child is
+reached only where all earlier ones failed, so that it may do anything in the states that they
+take: these are don't-cares of its minimization.  The last child is reached only in its own states
+and needs no condition at all.  The result chooses what the decision tree predicts in every state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.logic.conditions import deciding
+from rebt_ros.logic.dnf import Dnf, conditions_of
+from rebt_ros.logic.domain import infeasible, spelled_out
+from rebt_ros.logic.factoring import Factored, Parts, factored, named, pulled_out
+from rebt_ros.logic.float_reduction import implied_literals, reduced
+from rebt_ros.logic.intervals import enclosing_literals, intervals_among, with_intervals
+from rebt_ros.logic.minimize import cubes, minimized_cover
+from rebt_ros.logic.numbered import Codes, Numbering
+from rebt_ros.paper.re_bt_espresso import rule_tree, with_root
+from rebt_ros.paper.rules import FactoredRule, Rule
+
+#: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and
+#: entanglement make espresso take minutes there.
+MOST_LEAVES_BY_DOMAIN = 40
+
+#: Up to so many rules the best order is found, then the order that is best step by step; yet more
+#: rules are ordered by their number of leaves, as a search would take a minimization per pair.
+_MOST_RULES_IN_ANY_ORDER, _MOST_RULES_STEP_BY_STEP = 6, 16
+
+#: In larger decision trees, too, rules are ordered by their number of leaves.
+MOST_LEAVES_IN_BEST_ORDER = 500
+#: Rules of yet larger ones keep the decision tree's conditions: espresso would take minutes.
+MOST_LEAVES_MINIMIZED = 2000
+
+#: Nodes of any rule that has a condition: a Sequence of the condition and an action.
+_LEAST_COST = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Reductions:
+    """The reductions past the paper, each of which can be left out."""
+
+    domain: bool = True
+    """Infeasible combinations of conditions are don't-cares, in trees of up to 40 leaves."""
+    repeated_factoring: bool = True
+    """Factoring is repeated instead of done once."""
+    priority: bool = True
+    """Rules stand in order of priority, with the states of earlier ones as don't-cares."""
+    intervals: bool = True
+    """Two thresholds that enclose a feature are one condition."""
+
+
+ALL_REDUCTIONS = Reductions()
+
+
+def reduced_tree(
+    rules: Sequence[Rule],
+    reductions: Reductions = ALL_REDUCTIONS,
+    root: Root = Root.SELECTOR,
+) -> nodes.Node:
+    """The rules as a tree, reduced as far as asked.
+
+    Args:
+        rules: From `leaf_rules`: no two share a state, and together they cover all of them.
+        reductions: What to do; priority is for Selectors only.
+        root: Kind of the root node.
+    """
+    leaves = sum(len(rule.dnf) for rule in rules)
+    numbering = Numbering(conditions_of(_union(rule.dnf for rule in rules)))
+    implied = implied_literals(numbering.conditions)
+    covers = [numbering.cover(rule.dnf) for rule in rules]
+    is_minimized = leaves <= MOST_LEAVES_MINIMIZED
+    width = len(numbering.conditions)
+    inside = [cubes(one, width) for one in covers] if is_minimized else []
+    impossible = cubes((), width)
+    outside = inside
+    if reductions.domain and leaves <= MOST_LEAVES_BY_DOMAIN:
+        impossible = cubes(numbering.cover(infeasible(numbering.conditions)), width)
+        spelled = (spelled_out(rule.dnf, numbering.conditions) for rule in rules)
+        outside = [cubes(numbering.cover(one), width) for one in spelled]
+
+    @cache
+    def condition(rule: int, earlier: frozenset[int]) -> Parts:
+        minimized: Sequence[Codes] = covers[rule]
+        if is_minimized:
+            later = [one for one in range(len(rules)) if one != rule and one not in earlier]
+            minimized = minimized_cover(
+                inside[rule],
+                dont_care=[*(inside[one] for one in sorted(earlier)), impossible],
+                off=[outside[one] for one in later],
+            )
+        return (factored if reductions.repeated_factoring else pulled_out)(
+            reduced(minimized, implied)
+        )
+
+    def cost(rule: int, earlier: frozenset[int]) -> int:
+        return size_of(condition(rule, earlier), len(rules[rule].actions), enclosing)
+
+    enclosing = enclosing_literals(numbering.conditions) if reductions.intervals else None
+    order: Sequence[int] = range(len(rules))
+    by_priority = reductions.priority and root is Root.SELECTOR
+    if by_priority:
+        order = (
+            _best_order(len(rules), cost)
+            if len(rules) <= _MOST_RULES_STEP_BY_STEP and leaves <= MOST_LEAVES_IN_BEST_ORDER
+            else sorted(order, key=lambda rule: len(rules[rule].dnf))
+        )
+    trees = []
+    for place, rule in enumerate(order):
+        found = condition(rule, frozenset(order[:place]) if by_priority else frozenset())
+        trees.append(_child(rules[rule].actions, named(found, numbering), reductions))
+    return with_root(root, trees)
+
+
+def size_of(condition: Parts, actions: int, enclosing: Sequence[int] | None) -> int:
+    """Nodes of a rule's tree, which is not built to be counted.
+
+    Args:
+        condition: Of the rule; float-reduced.
+        actions: How many it triggers.
+        enclosing: From `enclosing_literals`; None where thresholds do not become intervals.
+    """
+    children, found = _extent(condition, enclosing)
+    return _under_one(children + 1, found + actions + (actions > 1))
+
+
+def _extent(condition: Parts, enclosing: Sequence[int] | None) -> tuple[int, int]:
+    """The trees of a condition, and the nodes of all of them together."""
+    children = len(condition.common)
+    if enclosing is not None:
+        children -= intervals_among(condition.common, enclosing)
+    if not condition.alternatives:
+        return children, children
+    below = sum(_under_one(*_extent(one, enclosing)) for one in condition.alternatives)
+    return children + 1, children + 1 + below
+
+
+def _under_one(children: int, found: int) -> int:
+    """The nodes with the Sequence over them, which a single child does without."""
+    return found if children == 1 else found + 1
+
+
+def _cheapest(
+    left: Sequence[int], earlier: frozenset[int], cost: Callable[[int, frozenset[int]], int]
+) -> int:
+    """The first of those that cost least."""
+    costs: dict[int, int] = {}
+    for rule in left:
+        costs[rule] = cost(rule, earlier)
+        if costs[rule] == _LEAST_COST:
+            break
+    return min(costs, key=costs.__getitem__)
+
+
+def _child(
+    actions: tuple[nodes.Action, ...], condition: Factored, reductions: Reductions
+) -> nodes.Node:
+    if reductions.intervals:
+        condition = with_intervals(condition)
+    labels = tuple(action.label for action in actions)
+    return rule_tree(FactoredRule(actions, _meant_by(labels, condition)), frozenset())
+
+
+def _best_order(rules: int, cost: Callable[[int, frozenset[int]], int]) -> tuple[int, ...]:
+    """The order with the lowest sum of costs, or a good one where there are many rules.
+
+    Args:
+        rules: Number of rules.
+        cost: Of a rule after the set of those that come before it.
+    """
+    if rules > _MOST_RULES_IN_ANY_ORDER:
+        order: tuple[int, ...] = ()
+        while len(order) < rules:
+            earlier = frozenset(order)
+            left = [rule for rule in range(rules) if rule not in earlier]
+            order = (*order, _cheapest(left, earlier, cost))
+        return order
+    # What follows a set of rules does not depend on their order: dynamic programming over sets.
+    best: dict[frozenset[int], tuple[int, tuple[int, ...]]] = {frozenset(): (0, ())}
+    for _ in range(rules):
+        longer: dict[frozenset[int], tuple[int, tuple[int, ...]]] = {}
+        for earlier, (total, order) in best.items():
+            for rule in range(rules):
+                if rule not in earlier:
+                    extended = (total + cost(rule, earlier), (*order, rule))
+                    key = earlier | {rule}
+                    longer[key] = min(longer.get(key, extended), extended)
+        best = longer
+    return best[frozenset(range(rules))][1]
+
+
+def _union(dnfs: Iterable[Dnf]) -> Dnf:
+    return Dnf(tuple(conjunction for dnf in dnfs for conjunction in dnf))
+
+
+def _meant_by(actions: tuple[str, ...], condition: Factored) -> Factored:
+    """The condition as it is meant in a rule for these actions."""
+    return Factored(
+        tuple(deciding(literal, actions) for literal in condition.common),
+        tuple(_meant_by(actions, one) for one in condition.alternatives),
+    )

@@ -1,0 +1,98 @@
+"""The words of moments as a tree of their beginnings, to be read all at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from rebt_ros.arrays import Float32Array, FloatArray, IntArray
+from rebt_ros.beyond_the_paper.routines.moments import Moments, Word
+
+#: Different words that are read, those with the most rows.
+_MOST_WORDS = 120
+#: Actions of a word that are read.
+LONGEST_WORD = 9
+#: Share of an action's rows at least, so that noise of rare ones is not improbable beyond measure.
+_LEAST_SHARE = 0.001
+
+
+class Level(NamedTuple):
+    """The beginnings of words that have one length."""
+
+    parent: IntArray
+    """Position on the level before of the beginning without its last action, shape (n,)."""
+    action: IntArray
+    """The last action, shape (n,)."""
+    ended: FloatArray
+    """Moments whose word ends there, shape (n,)."""
+    cut: FloatArray
+    """Moments whose word goes on, but is read no further, shape (n,)."""
+    noise: Float32Array
+    """Share of the last action, by which noise is it, shape (n,)."""
+    children: Float32Array
+    """Which of them each beginning of the level before begins, 0 or 1, shape (n before, n)."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Corpus:
+    """The most frequent words."""
+
+    actions: int
+    levels: tuple[Level, ...]
+    moments: float
+    """How many moments have these words."""
+    rows: float
+    """How many actions of them are read."""
+    followers: FloatArray
+    """How often an action follows another one, shape (actions, actions)."""
+    share: FloatArray
+    """Share of each action, shape (actions,)."""
+    continues: float
+    """Share of actions that are followed by another one in the same moment."""
+
+
+def corpus(moments: Moments) -> Corpus:
+    """Reads the words of moments.
+
+    Args:
+        moments: At least one.
+    """
+    read: dict[Word, list[float]] = {}
+    actions = len(moments.actions)
+    followers, seen = np.zeros((actions, actions)), np.ones(actions)
+    words = moments.words[:_MOST_WORDS]
+    for word, count in zip(words, moments.counts.tolist(), strict=False):
+        read.setdefault(word[:LONGEST_WORD], [0.0, 0.0])[len(word) > LONGEST_WORD] += count
+        np.add.at(seen, list(word), count)
+        np.add.at(followers, (list(word[:-1]), list(word[1:])), count)
+    share = np.maximum(seen / seen.sum(), _LEAST_SHARE)
+    return Corpus(
+        actions,
+        tuple(_levels(read, share)),
+        sum(map(sum, read.values())),
+        sum(len(word) * sum(counts) for word, counts in read.items()),
+        followers,
+        share,
+        float(followers.sum() / (seen.sum() - actions)),
+    )
+
+
+def _levels(read: dict[Word, list[float]], share: FloatArray) -> list[Level]:
+    levels = []
+    before: dict[Word, int] = {(): 0}
+    for length in range(1, max(map(len, read)) + 1):
+        here = list(dict.fromkeys(word[:length] for word in read if len(word) >= length))
+        ends = np.array([read.get(word, [0.0, 0.0]) for word in here])
+        parent = np.array([before[word[:-1]] for word in here], dtype=np.int64)
+        action = np.array([word[-1] for word in here], dtype=np.int64)
+        children = np.zeros((len(before), len(here)), np.float32)
+        children[parent, np.arange(len(here))] = 1
+        levels.append(
+            Level(
+                parent, action, ends[:, 0], ends[:, 1], share[action].astype(np.float32), children
+            )
+        )
+        before = {word: place for place, word in enumerate(here)}
+    return levels

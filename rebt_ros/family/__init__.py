@@ -1,1 +1,0 @@
-"""The family of a learned tree: one tree for every pruning level, with its figures and files."""

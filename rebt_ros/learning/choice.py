@@ -1,0 +1,352 @@
+"""Choosing what to learn: the pruning level, what a tree may test beside the features, PSA nodes.
+
+All is decided in cross-validation, on rows that a tree was not learned from:
+
+- whether the tree may test the previous action: where that makes the explanation of the rows much
+  simpler, or raises the mean recall of unpruned trees, after their own choices, and makes it no
+  larger (see `FittedTree.explanation`);
+- whether it may test differences of features, by agreement and size;
+- the pruning level, by mean recall: pruning has to pay (see `selection`);
+- PSA nodes, by own-history agreement.
+
+Of the trees that fit the rows equally well, the simplest one is taken (see `simplest`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, IntArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.beyond_the_paper.priority_root import reduced_tree
+from rebt_ros.decision_tree.differences import likely_differences
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
+from rebt_ros.decision_tree.simplest import simplest
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.table import DemonstrationTable, part_of
+from rebt_ros.errors import OptionError
+from rebt_ros.learning import evaluation
+from rebt_ros.learning.cross_validation import (
+    MOST_FOLDS,
+    CrossValidation,
+    JudgedLevels,
+    clearly_raised,
+)
+from rebt_ros.learning.options import LearnOptions, Use
+from rebt_ros.logic.conditions import Difference
+from rebt_ros.paper.re_bt_espresso import re_bt_espresso
+from rebt_ros.paper.rules import delta_close, leaf_rules
+
+#: With fewer rows the folds are too small to tell anything.
+_FEWEST_ROWS = 20
+
+#: Of larger tables, so many rows, by whole demonstrations, tell what a tree may test; the level is
+#: chosen by all.
+_LARGE, _ROWS_THAT_TELL = 6_000, 2_000
+
+#: To which share the previous action has to bring the size of the explanation.
+_MUCH_SIMPLER = 0.8
+
+#: How much agreement differences may cost, and to which share of the leaves they have to come.
+_DEARER, _SMALLER = 0.005, 0.75
+
+#: Steps of four cross-validations, of running the trees of two, and of running them with PSA nodes
+#: and without.
+_MOST_STEPS = 4 * (MOST_FOLDS + 1) + 2 * MOST_FOLDS + 2 * MOST_FOLDS
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ChosenPolicy:
+    """What was chosen, and why."""
+
+    fitted: FittedTree
+    ccp_alpha: float
+    psa: bool
+    """Whether PSA nodes stand in the tree."""
+    levels: JudgedLevels | None
+    """The pruning levels that were chosen from; None where there was no choice."""
+    reasons: tuple[str, ...]
+    """A sentence for each choice."""
+    of_all: FittedTree | None = None
+    """The tree of all rows, also of those that were held out; None where none was chosen by."""
+
+
+class _Steps:
+    """Counts steps of the work and tells which share of it is behind at most."""
+
+    def __init__(self, advance: Callable[[float], None]) -> None:
+        self._advance = advance
+        self._taken = 0
+
+    def __call__(self) -> None:
+        self._taken += 1
+        self._advance(min(self._taken / _MOST_STEPS, 1.0))
+
+
+def choose(
+    table: DemonstrationTable,
+    options: LearnOptions,
+    advance: Callable[[float], None] = lambda share: None,
+    held_out: BoolArray | None = None,
+) -> ChosenPolicy:
+    """Chooses a policy.
+
+    Args:
+        table: By its rows alone.
+        options: What is left to choose.
+        advance: Told which share of the work is behind; there may be less of it.
+        held_out: Rows that have no say, shape (rows,).
+
+    Raises:
+        OptionError: There is no such pruning level as is asked for.
+    """
+    if len(table) < _FEWEST_ROWS:
+        return _unjudged(table, options)
+    choice = _Choice(table, options, _Steps(advance), held_out)
+    vocabulary = choice.vocabulary()
+    judged = choice.judged(vocabulary)
+    levels = judged.levels(partial(own_history_choices, options=options, psa=False))
+    ccp_alpha, reasons = _asked_for(judged.fitted, options), choice.reasons
+    if ccp_alpha is None:
+        ccp_alpha, reason = _level(levels, choice.shown)
+        reasons.append(reason)
+    psa, reason = _choose_psa(judged, ccp_alpha, options)
+    fitted = judged.fitted
+    if options.simplest and options.upsample is Upsampling.NONE:
+        fitted = simplest(choice.shown, fitted)
+        if fitted is not judged.fitted:
+            ccp_alpha = _of_another_fit(judged.fitted, ccp_alpha, fitted, options)
+            reasons.append(
+                f"Of the trees that fit the rows, one with {fitted.leaves} leaves is the simplest "
+                f"({judged.fitted.leaves} where splits are chosen greedily)."
+            )
+    return ChosenPolicy(fitted, ccp_alpha, psa, levels, (*reasons, reason), judged.of_all)
+
+
+def _asked_for(fitted: FittedTree, options: LearnOptions) -> float | None:
+    """The ``ccp_alpha`` that the options come to; None where it is left to choose."""
+    if options.level is None:
+        return options.ccp_alpha
+    if options.level >= len(fitted.path):
+        raise OptionError(
+            f"there is no pruning level {options.level}: the last one is {len(fitted.path) - 1}, "
+            "a tree that does one thing whatever happens."
+        )
+    return float(fitted.path.alphas[options.level])
+
+
+def _level(levels: JudgedLevels, shown: DemonstrationTable) -> tuple[float, str]:
+    """The ``ccp_alpha`` to prune at, and why."""
+    begun = int(np.count_nonzero(shown.previous != shown.chosen))
+    # Stretches of one demonstration may each be a part of the task that no other one shows.
+    if len(np.unique(shown.demonstration)) == 1 and begun < levels.shown.size:
+        return 0.0, (
+            f"One demonstration in which actions are begun {begun} times does not tell how far to "
+            "prune: the tree is not pruned."
+        )
+    recalls, chosen = levels.mean_recalls, levels.chosen
+    ccp_alpha = float(levels.ccp_alphas[chosen])
+    return ccp_alpha, (
+        f"Of {len(recalls)} pruning levels, ccp_alpha = {ccp_alpha:.3g} makes the largest tree "
+        f"whose mean recall ({recalls[chosen]:.1%}) is not clearly below the best "
+        f"({recalls[levels.best]:.1%}; {recalls[0]:.1%} unpruned)."
+    )
+
+
+def _of_another_fit(
+    judged: FittedTree, ccp_alpha: float, fitted: FittedTree, options: LearnOptions
+) -> float:
+    """Where to prune another fit to the same rows than the one whose levels were judged."""
+    asked = _asked_for(fitted, options)
+    # Its levels lie elsewhere: what was chosen is the range up to the next one.
+    return judged.path.middle(ccp_alpha) if asked is None else asked
+
+
+def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.Node:
+    """The behavior tree of a decision tree.
+
+    Raises:
+        OptionError: The root asked for makes no sense.
+    """
+    delta = options.delta if psa else None
+    if options.reductions is None:
+        return re_bt_espresso(trained.tree, delta=delta, root=options.root)
+    rules = leaf_rules(
+        trained.tree,
+        lambda leaf: (leaf.most_probable,) if delta is None else delta_close(leaf, delta),
+    )
+    return reduced_tree(rules, options.reductions, options.root)
+
+
+def own_history_choices(
+    trained: TrainedTree, table: DemonstrationTable, options: LearnOptions, *, psa: bool
+) -> IntArray:
+    """What the behavior tree of a decision tree chooses after its own choices.
+
+    It need not be made, which takes long, unless LAT or PSA nodes come with a history: it chooses
+    what the leaf of the decision tree does, or the best supported one of the leaf's PSA group.
+    """
+    history = trained.vocabulary.history
+    if history is History.LAST or (psa and history is not History.NONE):
+        return evaluation.own_history_choices(convert(trained, options, psa=psa), table)
+    if not psa:
+        return evaluation.decision_tree_choices(trained, table)
+    rules = leaf_rules(trained.tree, lambda leaf: delta_close(leaf, options.delta))
+    place = {action: position for position, action in enumerate(trained.tree.actions)}
+    first = {
+        frozenset(place[one] for one in rule.actions): place[rule.actions[0]] for rule in rules
+    }
+    leaves, of_row = trained.deciding(table)
+    chosen = [first[frozenset(delta_close(leaf, options.delta))] for leaf in leaves]
+    return np.array(chosen, dtype=np.int64)[of_row]
+
+
+def _unjudged(table: DemonstrationTable, options: LearnOptions) -> ChosenPolicy:
+    """Without cross-validation: no pruning, history and PSA only where they are asked for."""
+    fitted = fit(
+        table,
+        vocabulary=Vocabulary(options.history or History.NONE),
+        max_depth=options.max_depth,
+        random_state=options.random_state,
+        upsample=options.upsample,
+    )
+    reason = f"{len(table)} rows are too few to choose by: the tree is not pruned."
+    ccp_alpha = _asked_for(fitted, options) or 0.0
+    return ChosenPolicy(fitted, ccp_alpha, options.psa is Use.ALWAYS, None, (reason,))
+
+
+class _Choice:
+    """Cross-validations of one table, each made once."""
+
+    def __init__(
+        self,
+        table: DemonstrationTable,
+        options: LearnOptions,
+        step: Callable[[], None],
+        held_out: BoolArray | None,
+    ) -> None:
+        self._table, self._options, self._step = table, options, step
+        self._held_out = held_out
+        self.shown = table if held_out is None else table.where(~held_out)
+        """The rows to choose by."""
+        large = len(self.shown) > _LARGE
+        self._telling = part_of(self.shown, _ROWS_THAT_TELL) if large else self.shown
+        self._made: dict[tuple[bool, Vocabulary], CrossValidation] = {}
+        self.reasons: list[str] = []
+
+    def judged(self, vocabulary: Vocabulary, *, telling: bool = False) -> CrossValidation:
+        """Of all rows, or of those that tell what a tree may test."""
+        telling = telling and self._telling is not self.shown
+        key = telling, vocabulary
+        if key not in self._made:
+            options = self._options
+            self._made[key] = CrossValidation(
+                self._telling if telling else self._table,
+                vocabulary=vocabulary,
+                max_depth=options.max_depth,
+                random_state=options.random_state,
+                upsample=options.upsample,
+                step=self._step,
+                held_out=None if telling else self._held_out,
+            )
+        return self._made[key]
+
+    def vocabulary(self) -> Vocabulary:
+        """What the tree may test beside the features."""
+        vocabulary = Vocabulary(self._history())
+        return replace(vocabulary, differences=self._differences(vocabulary))
+
+    def _history(self) -> History:
+        asked = self._options.history
+        if asked is not None:
+            return asked
+        with_it = Vocabulary(History.PREVIOUS)
+        before, after = (self._fitted(one).explanation for one in (FEATURES_ALONE, with_it))
+        compared = f"{after} leaves and exceptions explain the rows, {before} without it"
+        if after <= _MUCH_SIMPLER * before:
+            self.reasons.append(f"The previous action is tested: {compared}.")
+            return History.PREVIOUS
+        if after > before:
+            self.reasons.append(f"The previous action is not tested: {compared}.")
+            return History.NONE
+        judged = [self.judged(one, telling=True).unpruned() for one in (FEATURES_ALONE, with_it)]
+        raised = clearly_raised(*judged)
+        without, recall = (one.mean_recalls[0] for one in judged)
+        self.reasons.append(
+            f"The previous action is {'tested' if raised else 'not tested'}: {compared}, and mean "
+            f"recall after its own choices is {'' if raised else 'not '}clearly higher "
+            f"({recall:.1%}, {without:.1%} without it)."
+        )
+        return History.PREVIOUS if raised else History.NONE
+
+    def _fitted(self, vocabulary: Vocabulary) -> FittedTree:
+        """Fitted to the rows that tell what a tree may test."""
+        options = self._options
+        return fit(
+            self._telling,
+            vocabulary=vocabulary,
+            max_depth=options.max_depth,
+            random_state=options.random_state,
+            upsample=options.upsample,
+        )
+
+    def _differences(self, vocabulary: Vocabulary) -> tuple[Difference, ...]:
+        options = self._options
+        if options.differences is Use.NEVER:
+            return ()
+        differences = likely_differences(
+            self._telling, vocabulary, options.units, options.random_state
+        )
+        if options.differences is Use.ALWAYS or not differences:
+            return differences
+        choices = partial(own_history_choices, options=options, psa=False)
+        without = self.judged(vocabulary, telling=True)
+        with_them = self.judged(replace(vocabulary, differences=differences), telling=True)
+        before, after = without.levels(choices), with_them.levels(choices)
+        counts = [one.fitted.path.leaf_counts() for one in (without, with_them)]
+        leaves = [
+            int(one[levels.chosen]) for one, levels in zip(counts, (before, after), strict=True)
+        ]
+        # Pruned trees can differ in size because one of them is pruned more: what differences say
+        # in one test instead of many shows before pruning, too.
+        smaller = all(
+            one <= _SMALLER * other
+            for one, other in ((leaves[1], leaves[0]), (counts[1][0], counts[0][0]))
+        )
+        agreements = [float(levels.means[levels.chosen]) for levels in (before, after)]
+        compared = (
+            f"{leaves[1]} instead of {leaves[0]} leaves, agreement {agreements[1]:.1%} instead of "
+            f"{agreements[0]:.1%}"
+        )
+        if smaller and agreements[1] >= agreements[0] - _DEARER:
+            self.reasons.append(f"Differences of features make a smaller tree ({compared}).")
+            return differences
+        self.reasons.append(f"Differences of features make no better tree ({compared}).")
+        return ()
+
+
+def _choose_psa(
+    judged: CrossValidation, ccp_alpha: float, options: LearnOptions
+) -> tuple[bool, str]:
+    if options.psa is not Use.AUTO:
+        return options.psa is Use.ALWAYS, f"PSA nodes: {options.psa.value}, as asked."
+    leaves = [leaf for _, leaf in judged.fitted.at(ccp_alpha).tree.paths()]
+    if all(len(delta_close(leaf, options.delta)) == 1 for leaf in leaves):
+        return False, f"No leaf has several actions within delta = {options.delta:g}."
+
+    def agreement(psa: bool) -> float:
+        return judged.own_history_at(
+            ccp_alpha, partial(own_history_choices, options=options, psa=psa)
+        )
+
+    with_psa, without = agreement(psa=True), agreement(psa=False)
+    compared = f"agreement ({with_psa:.1%} with them, {without:.1%} without)"
+    if with_psa > without:
+        return True, f"PSA nodes raise {compared}."
+    return False, f"PSA nodes do not raise {compared}."

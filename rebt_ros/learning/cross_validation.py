@@ -1,0 +1,259 @@
+"""Choosing a pruning level by cross-validation: pruning has to pay.
+
+recall
+    Of an action: the share of its rows on which a tree takes it, of the rows that it was not
+    learned from.
+
+A level is judged by its mean recall over all actions, so that an action that is rare but decisive
+counts as much as a frequent one.  The largest tree is chosen that is not clearly worse than the
+best one: by more than three quarters of a standard error of their difference, fold by fold.  Where
+demonstrators err, large trees are clearly worse, and pruned.  Elsewhere the few rows that decide a
+task stay.
+
+The usual rule of one standard error (Breiman et al., 1984) is another one: it takes the smallest
+tree, and an error that measures how much demonstrations differ instead of how much trees do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit_parts
+from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.learning.evaluation import decision_tree_choices
+
+MOST_FOLDS = 5
+#: Standard errors of a difference from which on it is clear.  A difference that a single fold makes
+#: is one standard error large, and clear; one on which folds disagree is not.
+_CLEAR = 0.75
+#: Folds of large tables, each of which has rows enough.
+_FEW_FOLDS, _MANY_ROWS = 3, 8_000
+#: A tree that may test LAT has to be converted and run through the rows to be judged: so many
+#: levels are, and no larger trees than that, which nobody could read anyway.
+_MOST_LEVELS_RUN, _MOST_LEAVES_RUN = 12, 32
+
+#: What the behavior tree of a pruned decision tree chooses in the rows of a table after its own
+#: choices in the rows before: positions in the table's actions.
+Choices = Callable[[TrainedTree, DemonstrationTable], IntArray]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class JudgedLevels:
+    """Pruning levels with how well the folds' trees do on the rows they were not learned from."""
+
+    ccp_alphas: FloatArray
+    """Ascending, shape (levels,): larger means a smaller tree."""
+    hits: IntArray
+    """Rows of each action on which a level takes it, shape (folds, levels, actions)."""
+    shown: IntArray
+    """Rows of each action, shape (folds, actions)."""
+
+    @property
+    def scores(self) -> FloatArray:
+        """Agreement with the rows of each fold, shape (folds, levels)."""
+        return np.asarray(self.hits.sum(axis=2) / self.shown.sum(axis=1)[:, np.newaxis])
+
+    @property
+    def means(self) -> FloatArray:
+        """Mean agreement of each level, shape (levels,)."""
+        return np.asarray(np.mean(self.scores, axis=0))
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard error of each mean agreement, shape (levels,)."""
+        return _standard_error(self.scores)
+
+    @property
+    def recalls(self) -> FloatArray:
+        """Recall of each action over all folds, NaN where it was not shown: (levels, actions)."""
+        shown = self.shown.sum(axis=0)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.hits.sum(axis=0) / shown)
+
+    @property
+    def mean_recalls(self) -> FloatArray:
+        """Mean recall of the actions at each level, shape (levels,)."""
+        return np.asarray(self.contributions.sum(axis=0))
+
+    @property
+    def best(self) -> int:
+        """The level with the highest mean recall; of equals, the one with the largest tree."""
+        # Sums of the same shares in another order may differ in the last bits.
+        return int(np.argmax(np.round(self.mean_recalls, 12)))
+
+    @property
+    def chosen(self) -> int:
+        """The largest tree that is not clearly worse than the best."""
+        contributions, best = self.contributions, self.best
+        worse = contributions[:, [best]] - contributions
+        clearly = _CLEAR * len(worse) * _standard_error(worse)
+        return int(np.argmax(np.round(worse.sum(axis=0) - clearly, 12) <= 0))
+
+    def at(self, ccp_alpha: float) -> int:
+        """The level that a ``ccp_alpha`` comes to."""
+        return max(int(np.searchsorted(self.ccp_alphas, ccp_alpha, side="right")) - 1, 0)
+
+    @property
+    def contributions(self) -> FloatArray:
+        """What each fold adds to the mean recall, shape (folds, levels)."""
+        shown = self.shown.sum(axis=0)
+        return np.asarray(np.mean(self.hits[..., shown > 0] / shown[shown > 0], axis=2))
+
+
+def clearly_raised(before: JudgedLevels, after: JudgedLevels) -> bool:
+    """Whether the first level's mean recall is clearly higher, fold by fold, in the same folds."""
+    gains = after.contributions[:, :1] - before.contributions[:, :1]
+    clearly = _CLEAR * len(gains) * _standard_error(gains)
+    return bool(np.round(gains.sum(axis=0) - clearly, 12)[0] > 0)
+
+
+def _standard_error(values: FloatArray) -> FloatArray:
+    """Of the mean over the first axis; 0 where there is one value only."""
+    if len(values) < 2:
+        return np.zeros(values.shape[1:])
+    return np.asarray(np.std(values, axis=0, ddof=1) / np.sqrt(len(values)))
+
+
+def mean_recall(hits: IntArray, shown: IntArray) -> FloatArray:
+    """The mean over the actions that were shown of the share of their rows that was hit.
+
+    Args:
+        hits: Rows, shape (..., actions).
+        shown: Of so many, shape (actions,).
+    """
+    occurring = shown > 0
+    return np.asarray(np.mean(hits[..., occurring] / shown[occurring], axis=-1))
+
+
+class CrossValidation:
+    """One fit to some rows and one to those outside each fold, all with their pruning levels.
+
+    A level's ``ccp_alpha`` stands for the range up to the next one, at whose geometric middle the
+    folds' trees are pruned.
+
+    Args:
+        table: At least two rows.
+        vocabulary: What the trees may test beside the features.
+        max_depth: Splits on the longest path; None for no limit.
+        random_state: Decides between equally good splits, and which rows are made up.
+        upsample: Rows to fit the trees to beside those of the table; none is judged on them.
+        step: Called after each tree that was fitted, and each fold in which trees were run.
+        held_out: Rows that are in no fold, and that no fold's tree is fitted to, shape (rows,).
+    """
+
+    def __init__(
+        self,
+        table: DemonstrationTable,
+        *,
+        vocabulary: Vocabulary = FEATURES_ALONE,
+        max_depth: int | None = None,
+        random_state: int = 0,
+        upsample: Upsampling = Upsampling.NONE,
+        step: Callable[[], None] = lambda: None,
+        held_out: BoolArray | None = None,
+    ) -> None:
+        self._step = step
+        self._actions = len(table.actions)
+        inside = np.ones(len(table), dtype=bool) if held_out is None else ~held_out
+        fold = np.full(len(table), -1)
+        fold[inside] = folds(table.where(inside))
+        numbers = np.unique(fold[inside])
+        trees: list[FittedTree] = []
+        # The largest first, so that no core waits for the last one.
+        for tree in fit_parts(
+            table,
+            [
+                *([] if held_out is None else [inside]),
+                *(inside & (fold != number) for number in numbers),
+            ],
+            vocabulary=vocabulary,
+            max_depth=max_depth,
+            random_state=random_state,
+            upsample=upsample,
+        ):
+            trees.append(tree)
+            step()
+        self.of_all = trees[0]
+        """Fitted to all rows."""
+        self.fitted, *of_folds = trees if held_out is None else trees[1:]
+        self._folds = [
+            (tree, table.where(fold == number))
+            for tree, number in zip(of_folds, numbers, strict=True)
+        ]
+        self._middles = self.fitted.path.middles
+
+    def teacher_forced(self) -> JudgedLevels:
+        """All levels after what the demonstrator did."""
+        hits = [fitted.hits(rows, self._middles) for fitted, rows in self._folds]
+        return self._judged(self.fitted.path.alphas, hits)
+
+    def levels(self, choices: Choices) -> JudgedLevels:
+        """The levels to choose from: all, or an even selection if LAT is tested.
+
+        What the demonstrator did before is what a previous action is taken from.  LAT knows the
+        action of its own row, so that trees which test it are judged after their own choices.
+        """
+        if self.fitted.vocabulary.history is not History.LAST:
+            return self.teacher_forced()
+        small = np.flatnonzero(self.fitted.path.leaf_counts() <= _MOST_LEAVES_RUN)
+        even = np.linspace(0, len(small) - 1, min(len(small), _MOST_LEVELS_RUN)).astype(int)
+        run = small[np.unique(even)]
+        hits = [self._run(place, self._middles[run], choices) for place in range(len(self._folds))]
+        return self._judged(self.fitted.path.alphas[run], hits)
+
+    def unpruned(self) -> JudgedLevels:
+        """The folds' unpruned trees, after their own choices: one level."""
+        unpruned = np.zeros(1)
+        hits = [
+            self._run(place, unpruned, decision_tree_choices) for place in range(len(self._folds))
+        ]
+        return self._judged(unpruned, hits)
+
+    def own_history_at(self, ccp_alpha: float, choices: Choices) -> float:
+        """Mean own-history agreement of the folds' trees at one level."""
+        level = np.array([ccp_alpha])
+        hits = [self._run(place, level, choices) for place in range(len(self._folds))]
+        return float(self._judged(level, hits).means[0])
+
+    @property
+    def _shown(self) -> IntArray:
+        counts = [np.bincount(rows.chosen, minlength=self._actions) for _, rows in self._folds]
+        return np.array(counts)
+
+    def _judged(self, ccp_alphas: FloatArray, hits: list[IntArray]) -> JudgedLevels:
+        return JudgedLevels(ccp_alphas, np.array(hits), self._shown)
+
+    def _run(self, fold: int, ccp_alphas: FloatArray, choices: Choices) -> IntArray:
+        """The hits of a fold's trees at some levels, after their own choices."""
+        fitted, rows = self._folds[fold]
+        known: dict[bytes, IntArray] = {}
+        found: list[IntArray] = []
+        for ccp_alpha in ccp_alphas.tolist():
+            # The levels are those of another tree, several of which can be one level of this one.
+            level = fitted.path.leaves_at(ccp_alpha).tobytes()
+            if level not in known:
+                right = choices(fitted.at(ccp_alpha), rows) == rows.chosen
+                known[level] = np.bincount(rows.chosen[right], minlength=self._actions)
+            found.append(known[level])
+        self._step()
+        return np.array(found)
+
+
+def folds(table: DemonstrationTable) -> IntArray:
+    """The fold of each row: whole demonstrations, or stretches of the only one, shape (rows,).
+
+    Neighbouring rows resemble each other, so that a row whose neighbours were learned from would
+    tell little.
+    """
+    most = MOST_FOLDS if len(table) < _MANY_ROWS else _FEW_FOLDS
+    shown, position = np.unique(table.demonstration, return_inverse=True)
+    if len(shown) == 1:
+        return np.arange(len(table)) * most // max(len(table), 1)
+    return position * min(most, len(shown)) // len(shown)

@@ -1,0 +1,165 @@
+"""How to learn: everything that the paper's section III leaves to the user, and more."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.beyond_the_paper.priority_root import ALL_REDUCTIONS, Reductions
+from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.schema import LARGEST_LAG
+from rebt_ros.errors import OptionError
+from rebt_ros.learning.suggestions import PsaChoice
+
+#: No one reacts later than that (seconds).
+_LATEST = 5.0
+
+
+class Use(Enum):
+    """Whether the executed tree has something."""
+
+    AUTO = "auto"
+    """Only where cross-validation speaks for it (see `choosing`)."""
+    ALWAYS = "always"
+    NEVER = "never"
+
+
+@dataclass(frozen=True, slots=True)
+class LearnOptions:
+    """What section III of the paper leaves to the user, and how to judge the result.
+
+    Raises:
+        OptionError: A value out of its range.
+    """
+
+    delta: float = 0.3
+    """Threshold δ in [0, 1] of actions that are close enough to stand in one PSA node."""
+    psa: Use = Use.AUTO
+    """Whether PSA nodes stand in the executed tree."""
+    history: History | None = None
+    """What the executed tree may test of what was done before; None to choose between the previous
+    action and nothing by cross-validation (paper: LAT)."""
+    differences: Use = Use.AUTO
+    """Whether the executed tree may test the difference of two features."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Units of features by their names: of different ones there is no difference."""
+    max_depth: int | None = None
+    """Splits on the decision tree's longest path; None to grow it fully, which leaves its size to
+    pruning (paper: 5)."""
+    ccp_alpha: float | None = None
+    """Complexity parameter of minimal cost-complexity pruning, 0 prunes nothing; None to choose
+    it by cross-validation."""
+    level: int | None = None
+    """Number of the pruning level, 0 prunes nothing, instead of a complexity parameter."""
+    root: Root = Root.SELECTOR
+    reductions: Reductions | None = ALL_REDUCTIONS
+    """Reductions past the paper; None for Algorithm 1 as printed."""
+    test_fraction: float = 0.25
+    """Share of the rows, or of the demonstrations if several, that is held out; in [0, 1)."""
+    refit: bool = True
+    """Whether the tree is learned from all rows in the end, once it has been judged."""
+    simplest: bool = True
+    """Whether, of the trees that fit the rows, the simplest one is searched for, instead of the
+    one that is grown greedily; in trees of up to 30 leaves."""
+    readable_thresholds: bool = True
+    """Whether thresholds are moved to round values that splits share, within the gaps between the
+    rows that were shown."""
+    reaction_time: float | None = None
+    """How late the demonstrator acted (seconds), to be undone before learning; None to read it off
+    the demonstrations if their rows are samples, and otherwise 0."""
+    random_state: int = 0
+    """Decides between equally good splits, and which rows are made up."""
+    lags: int = 0
+    """How many rows each state feature looks back, 0 to 20; rows should be evenly spaced."""
+    upsample: Upsampling = Upsampling.NONE
+    """Rows that decision trees are fitted to beside those shown; none is ever judged on them."""
+    attach: tuple[str, ...] = ()
+    """Ids of the suggestions to attach, or `ALL`."""
+    routines: bool = True
+    """Whether Sequences and Repeaters are looked for in rows that share one state."""
+    psa_choice: PsaChoice | None = None
+    """What to turn all PSA nodes into; None to leave them to the user."""
+
+    def __post_init__(self) -> None:
+        self._take_words()
+        if not 0 <= self.delta <= 1:
+            raise OptionError(f"delta must lie between 0 and 1, not at {self.delta:g}.")
+        if self.max_depth is not None and self.max_depth < 1:
+            raise OptionError(f"max_depth must be at least 1, not {self.max_depth}.")
+        if self.ccp_alpha is not None and not 0 <= self.ccp_alpha < math.inf:
+            raise OptionError(f"ccp_alpha must be 0 or more, not {self.ccp_alpha:g}.")
+        if self.level is not None and self.level < 0:
+            raise OptionError(f"level must be 0 or more, not {self.level}.")
+        if self.level is not None and self.ccp_alpha is not None:
+            raise OptionError("level and ccp_alpha both say how far to prune: give one of them.")
+        if not 0 <= self.test_fraction < 1:
+            raise OptionError(
+                f"test_fraction must be at least 0 and less than 1, not {self.test_fraction:g}."
+            )
+        if self.reaction_time is not None and not 0 <= self.reaction_time <= _LATEST:
+            raise OptionError(
+                f"reaction_time must lie between 0 and {_LATEST:g} seconds, not at "
+                f"{self.reaction_time:g}."
+            )
+        if not 0 <= self.random_state < 2**32:
+            raise OptionError(f"random_state must be a 32-bit number, not {self.random_state}.")
+        if not 0 <= self.lags <= LARGEST_LAG:
+            raise OptionError(f"lags must lie between 0 and {LARGEST_LAG}, not at {self.lags}.")
+
+    def _take_words(self) -> None:
+        """Takes the words of enums, as they stand on the command line, for their members."""
+        for name, kind in _ENUMS.items():
+            value = getattr(self, name)
+            words = [str(member.value) for member in kind]
+            if isinstance(value, str) and value in words:
+                object.__setattr__(self, name, kind(value))
+            elif name in _CHOSEN and (value is None or value == "auto"):
+                object.__setattr__(self, name, None)
+            elif not isinstance(value, kind):
+                known = ", ".join(words)
+                raise OptionError(f"{name} must be one of {known}, not {value!r}.")
+        if isinstance(self.attach, str):
+            object.__setattr__(self, "attach", (self.attach,))
+
+    @property
+    def is_paper(self) -> bool:
+        """Whether Algorithms 1 and 2 are followed as printed."""
+        return self.reductions is None
+
+    @classmethod
+    def paper(cls) -> LearnOptions:
+        """The paper's settings (IV-B)."""
+        return cls(
+            delta=0.3,
+            psa=Use.ALWAYS,
+            history=History.LAST,
+            differences=Use.NEVER,
+            max_depth=5,
+            ccp_alpha=0.0,
+            root=Root.PARALLEL,
+            reductions=None,
+            refit=False,
+            simplest=False,
+            readable_thresholds=False,
+            reaction_time=0.0,
+            routines=False,
+        )
+
+
+#: Options that are one of several words.
+_ENUMS: Mapping[str, type[Enum]] = {
+    "psa": Use,
+    "history": History,
+    "differences": Use,
+    "root": Root,
+    "upsample": Upsampling,
+    "psa_choice": PsaChoice,
+}
+#: Those that are None where nobody chose.
+_CHOSEN = frozenset({"history", "psa_choice"})
+
+DEFAULTS = LearnOptions()

@@ -1,0 +1,409 @@
+"""From demonstrations to a learned tree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import (
+    ChannelProvenance,
+    Figures,
+    LearnedTree,
+    Provenance,
+)
+from rebt_ros.beyond_the_paper.priority_root import MOST_LEAVES_IN_BEST_ORDER, MOST_LEAVES_MINIMIZED
+from rebt_ros.decision_tree.shown_rows import shown_rows
+from rebt_ros.decision_tree.training import FittedTree, TrainedTree
+from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.demonstration import Demonstration, RowKind
+from rebt_ros.demonstration.lags import evenly_spaced, with_lags
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.errors import InputError, OptionError
+from rebt_ros.learning import evaluation
+from rebt_ros.learning.choice import ChosenPolicy, choose, convert, own_history_choices
+from rebt_ros.learning.cross_validation import mean_recall
+from rebt_ros.learning.options import DEFAULTS, LearnOptions
+from rebt_ros.learning.reaction_time import ReactionTime, estimate, given, shifted
+from rebt_ros.learning.report import LearningReport, report_on
+from rebt_ros.learning.suggesting import accept, routines_of, suggest
+from rebt_ros.learning.suggestions import ALL
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Learning:
+    """A learned tree beside what it was made from."""
+
+    learned: LearnedTree
+    decision_tree: TrainedTree
+    table: DemonstrationTable
+    held_out: BoolArray
+    """Rows that the tree was judged on, shape (rows,)."""
+    policy: ChosenPolicy
+    """What was chosen to learn, and why."""
+    judge: FittedTree
+    """Fitted to the rows that were not held out: what figures come from."""
+    report: LearningReport
+    """What a person must know about it."""
+    notes: tuple[str, ...] = ()
+    """What a person should know about it; no full stops."""
+
+
+_UNEVEN = (
+    "the rows of channel {!r} are not evenly spaced, so that a row back is now more, now less time "
+    "back: record with a sample rate to use lags"
+)
+_LARGE = (
+    "the decision tree of channel {!r} has {} leaves, too many for the best order of the rules to "
+    "be searched for: they stand by their number of leaves; prune more for a smaller tree"
+)
+_VERY_LARGE = (
+    "the decision tree of channel {!r} has {} leaves, too many for its rules to be minimized and "
+    "put in their best order: they keep its conditions; prune more for a smaller tree"
+)
+
+#: Up to so many rows, what is learned from all of them is chosen from all of them as well.
+_CHOSEN_FROM_ALL = 5_000
+
+#: Where of all the work choosing and judging begin.
+_CHOOSING, _JUDGING = 0.1, 0.8
+
+#: Told what is being done and which share of the work is behind.
+Progress = Callable[[str, float], None]
+
+
+def learn(
+    demonstrations: Sequence[Demonstration],
+    options: LearnOptions = DEFAULTS,
+    declared: Mapping[str, FeatureKind] | None = None,
+) -> LearnedTree:
+    """Learns a behavior tree from all demonstrations.
+
+    Args:
+        demonstrations: What was shown, oldest first.
+        options: How to learn.
+        declared: Kinds of features by name, where they should not be detected.
+
+    Raises:
+        InputError: Too few rows or actions, or features that differ.
+        OptionError: A declared kind does not fit its feature.
+    """
+    return side_by_side(learn_channels(tabulate(demonstrations, declared), options))
+
+
+def learn_channels(
+    tables: Sequence[DemonstrationTable],
+    options: LearnOptions = DEFAULTS,
+    progress: Progress = lambda stage, share: None,
+) -> tuple[Learning, ...]:
+    """Learns one policy for each channel; see `learn`."""
+    for one in options.attach if len(tables) > 1 else ():
+        if one != ALL and not any(one.startswith(f"{table.channel}/") for table in tables):
+            raise OptionError(
+                f"there is no suggestion {one!r} to attach: with several channels, an id begins "
+                f"with its channel, such as {tables[0].channel}/psa-1."
+            )
+
+    def of_channel(place: int) -> Progress:
+        return lambda stage, share: progress(stage, (place + share) / len(tables))
+
+    return tuple(
+        learn_from(table, _of_channel(table.channel, options, len(tables)), of_channel(place))
+        for place, table in enumerate(tables)
+    )
+
+
+def _of_channel(channel: str, options: LearnOptions, channels: int) -> LearnOptions:
+    """The options with the ids of this channel's suggestions, which are led by its name."""
+    if channels == 1:
+        return options
+    led = f"{channel}/"
+    mine = (one.removeprefix(led) for one in options.attach if one == ALL or one.startswith(led))
+    return replace(options, attach=tuple(mine))
+
+
+def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
+    """One tree of the policies of several channels, which act at the same time."""
+    trees = [learning.learned for learning in learnings]
+    first = trees[0]
+    if len(trees) == 1:
+        return first
+    channels = tuple(
+        ChannelProvenance(
+            learning.table.channel,
+            one.provenance.rows,
+            one.provenance.ccp_alpha,
+            one.provenance.history,
+            one.provenance.figures,
+        )
+        for learning, one in zip(learnings, trees, strict=True)
+    )
+    return LearnedTree(
+        first.features,
+        tuple(action for one in trees for action in one.actions),
+        nodes.Parallel(tuple(one.tree for one in trees)),
+        replace(
+            first.provenance,
+            demonstrations=max(one.provenance.demonstrations for one in trees),
+            rows=sum(one.rows for one in channels),
+            ccp_alpha=max(one.ccp_alpha for one in channels),
+            history=next(
+                (one.history for one in channels if one.history is not History.NONE), History.NONE
+            ),
+            figures=_pooled([one.figures for one in channels]),
+            channels=channels,
+            late_rows=max(one.provenance.late_rows for one in trees),
+            late_seconds=max(
+                (late for one in trees if (late := one.provenance.late_seconds) is not None),
+                default=None,
+            ),
+        ),
+        tuple(
+            replace(suggestion, id=f"{channel.channel}/{suggestion.id}")
+            for channel, one in zip(channels, trees, strict=True)
+            for suggestion in one.suggestions
+        ),
+        tuple(channel for one in trees for channel in one.shown),
+    )
+
+
+def _pooled(figures: Sequence[Figures]) -> Figures:
+    """Figures over the rows of all channels."""
+    rows = sum(one.held_out_rows for one in figures)
+
+    def share(agreements: Sequence[float | None]) -> float | None:
+        agreeing = [
+            agreement * one.held_out_rows
+            for agreement, one in zip(agreements, figures, strict=True)
+            if agreement is not None
+        ]
+        return sum(agreeing) / rows if rows else None
+
+    return Figures(
+        sum(one.fidelity_mismatches for one in figures),
+        share([one.teacher_forced_agreement for one in figures]),
+        share([one.own_history_agreement for one in figures]),
+        rows,
+        share([one.mean_recall for one in figures]),
+    )
+
+
+def learn_from(
+    table: DemonstrationTable,
+    options: LearnOptions = DEFAULTS,
+    progress: Progress = lambda stage, share: None,
+) -> Learning:
+    """Learns the policy of one channel; see `learn`.
+
+    Args:
+        table: Its rows, without lagged features: those that the options ask for are added.
+        options: How to learn.
+        progress: Told what is being done and which share of the work is behind.
+    """
+    late = reaction_time_of(table, options)
+    table = shifted(table, late.rows)
+    if len(np.unique(table.chosen)) < 2:
+        shown = table.actions[table.chosen[0]]
+        raise InputError(
+            f"the {len(table)} rows of channel {table.channel!r} show one action only ({shown!r}): "
+            "demonstrate at least two, as there is nothing to decide between."
+        )
+    # Before any rows are set apart, so that each still knows those before it.
+    table = with_lags(table, options.lags)
+    held_out = table.held_out(options.test_fraction)
+    judged, policy = _chosen(table, held_out, options, progress)
+    learned_from = table if options.refit else table.where(~held_out)
+    judge = judged.fitted
+    ccp_alpha = judged.ccp_alpha if options.level is None else policy.ccp_alpha
+    figures = figures_of(table.where(held_out), judge.at(ccp_alpha), options, policy.psa)
+    trained = pruned(policy.fitted, policy.ccp_alpha, learned_from, options)
+    whole = convert(trained, options, psa=policy.psa)
+    progress("suggesting", 0.9)
+    routines = routines_of(learned_from, options)
+    suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options, routines)
+    tree, suggestions = accept(whole, suggestions, options)
+    figures = replace(figures, fidelity_mismatches=mismatches(table, trained, whole))
+    learned = as_learned(learned_from, trained, tree, policy.ccp_alpha, figures, options)
+    provenance = replace(
+        learned.provenance, late_rows=late.rows, late_seconds=late.seconds if late.rows else None
+    )
+    ranges = shown_rows(learned_from, trained)
+    history = trained.vocabulary.history
+    report = report_on(learned_from, tree, history, policy.levels, policy.ccp_alpha)
+    progress("done", 1.0)
+    return Learning(
+        replace(learned, provenance=provenance, suggestions=suggestions, shown=(ranges,)),
+        trained,
+        table,
+        held_out,
+        policy,
+        judge,
+        report,
+        (
+            *((late.sentence,) if late.rows else ()),
+            *report.notes(),
+            *trained.notes,
+            *notes,
+            *_cautions(table, trained, options),
+        ),
+    )
+
+
+def _chosen(
+    table: DemonstrationTable, held_out: BoolArray, options: LearnOptions, progress: Progress
+) -> tuple[ChosenPolicy, ChosenPolicy]:
+    """The policy to judge, which knows nothing of the rows held out, and the one to publish."""
+    progress("choosing", _CHOOSING)
+    # Of few rows each one counts, also for what is chosen: it is chosen once more from all.  So it
+    # is where a level is asked for, which is one of the tree that is published.
+    again = options.refit and (len(table) <= _CHOSEN_FROM_ALL or options.level is not None)
+
+    def advance(share: float) -> None:
+        progress("choosing", _CHOOSING + (_JUDGING - _CHOOSING) * share)
+
+    if options.refit and not again:
+        judged = choose(table, options, advance, held_out)
+    else:
+        kept = replace(options, level=None) if again else options
+        judged = choose(table.where(~held_out), kept, advance)
+    progress("judging", _JUDGING)
+    if not options.refit:
+        return judged, judged
+    progress("learning from all rows", _JUDGING)
+    return judged, choose(table, options) if again else _of_all(judged, options)
+
+
+def reaction_time_of(table: DemonstrationTable, options: LearnOptions) -> ReactionTime:
+    """How late the demonstrator acted, as the options say or as the rows show.
+
+    Raises:
+        OptionError: It is given in seconds, but stamps tell no time.
+    """
+    if options.reaction_time is not None:
+        return given(table, options.reaction_time)
+    if table.row_kind is RowKind.EVENT:
+        return given(table, 0.0)
+    return estimate(table)
+
+
+def _of_all(policy: ChosenPolicy, options: LearnOptions) -> ChosenPolicy:
+    """A policy of all rows, as chosen from those that were not held out."""
+    assert policy.of_all is not None
+    ccp_alpha = policy.ccp_alpha
+    if options.ccp_alpha is None:
+        # The levels of another fit lie elsewhere: what was chosen is the range up to the next one.
+        ccp_alpha = policy.fitted.path.middle(ccp_alpha)
+    return replace(policy, fitted=policy.of_all, ccp_alpha=ccp_alpha)
+
+
+def pruned(
+    fitted: FittedTree, ccp_alpha: float, table: DemonstrationTable, options: LearnOptions
+) -> TrainedTree:
+    """The decision tree of a pruning level, with thresholds as the options say.
+
+    Args:
+        fitted: The tree.
+        ccp_alpha: The level.
+        table: What it was fitted to.
+        options: How to learn.
+    """
+    if options.readable_thresholds and options.upsample is Upsampling.NONE:
+        return fitted.readable_at(ccp_alpha, table)
+    return fitted.at(ccp_alpha)
+
+
+def _cautions(
+    table: DemonstrationTable, trained: TrainedTree, options: LearnOptions
+) -> Iterator[str]:
+    """What a user should know about the table and the decision tree."""
+    if options.lags and not evenly_spaced(table):
+        yield _UNEVEN.format(table.channel)
+    leaves = trained.tree.leaves
+    if options.reductions is None or leaves <= MOST_LEAVES_IN_BEST_ORDER:
+        return
+    if leaves <= MOST_LEAVES_MINIMIZED:
+        yield _LARGE.format(table.channel, leaves)
+    else:
+        yield _VERY_LARGE.format(table.channel, leaves)
+
+
+def figures_of(
+    rows: DemonstrationTable, trained: TrainedTree, options: LearnOptions, psa: bool
+) -> Figures:
+    """How well the behavior tree of a decision tree does on rows that it was not learned from.
+
+    Of fidelity nothing is said: that is about the tree that is published (see `mismatches`).
+    """
+    if not len(rows):
+        return Figures(0, None, None, 0)
+    forced = trained.predict(rows)
+    if psa or trained.vocabulary.history is History.LAST:
+        tree = convert(trained, options, psa=psa)
+        forced = evaluation.teacher_forced_choices(tree, rows)
+    own = own_history_choices(trained, rows, options, psa=psa)
+    shown = np.bincount(rows.chosen, minlength=len(rows.actions))
+    hits = np.bincount(rows.chosen[own == rows.chosen], minlength=len(rows.actions))
+    return Figures(
+        0,
+        evaluation.agreement(forced, rows),
+        evaluation.agreement(own, rows),
+        len(rows),
+        float(mean_recall(hits, shown)),
+    )
+
+
+def as_learned(
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    tree: nodes.Node,
+    ccp_alpha: float,
+    figures: Figures,
+    options: LearnOptions,
+) -> LearnedTree:
+    """A behavior tree with where it came from."""
+    return LearnedTree(
+        table.features,
+        evaluation.actions_of(table),
+        tree,
+        Provenance(
+            demonstrations=len(np.unique(table.demonstration)),
+            rows=len(table),
+            delta=options.delta,
+            max_depth=options.max_depth,
+            ccp_alpha=ccp_alpha,
+            root=options.root,
+            history=trained.vocabulary.history,
+            figures=figures,
+        ),
+        row_kind=table.row_kind,
+    )
+
+
+def mismatches(table: DemonstrationTable, trained: TrainedTree, tree: nodes.Node) -> int:
+    """Rows on which a behavior tree chooses something else than its decision tree."""
+    chosen = evaluation.teacher_forced_choices(tree, table)
+    return int(np.sum(chosen != trained.predict(table)))
+
+
+def summary_sentence(learned: LearnedTree) -> str:
+    """What was learned, in one sentence."""
+    provenance = learned.provenance
+    figures = provenance.figures
+    shown = provenance.demonstrations
+    judged = "it is not judged, as no rows were held out"
+    if figures.own_history_agreement is not None:
+        # Rows that it was judged on may have been learned from afterwards.
+        judged = (
+            f"learned without them, it agrees with {figures.own_history_agreement:.1%} of "
+            f"{figures.held_out_rows} held-out rows"
+        )
+    return (
+        f"Learned a behavior tree with {nodes.size(learned.tree)} nodes and "
+        f"{len(nodes.actions(learned.tree))} actions from {provenance.rows} rows of "
+        f"{shown} demonstration{'s' if shown != 1 else ''}; {judged}."
+    )

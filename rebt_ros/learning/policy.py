@@ -1,0 +1,252 @@
+"""A learned tree as an object that acts: from a state to what to do, in any program.
+
+Every episode has a history of its own, exactly as the executor has it: what was done at the step
+before, LAT, and the states that lagged features look back at.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, FloatArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.prediction import Plan, States, holds_after
+from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
+from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.table import category
+from rebt_ros.errors import InputError
+from rebt_ros.logic.conditions import HistoryCondition
+from rebt_ros.storage.tree_file import read_tree
+
+#: A value of a feature: a number, a truth value, a category, or None where it is missing.
+Value: TypeAlias = float | bool | str | None
+#: Values by the names of the features, or in the order of the features.
+State: TypeAlias = Mapping[str, Value] | Sequence[Value]
+#: A label; None where the tree does nothing.  With several channels, one for each.
+Decision: TypeAlias = str | dict[str, str | None] | None
+
+
+class Policy:
+    """What a learned tree does, step by step, in one episode or in several side by side.
+
+    An action counts as done once it is chosen.
+
+    >>> from rebt_ros.learning.policy import Policy
+    >>> policy = Policy("learned/tree.json")  # doctest: +SKIP
+    >>> policy.act({"front": 0.2, "docked": False})  # doctest: +SKIP
+    'turn_left'
+
+    Args:
+        tree: A learned tree, or the file of one.
+
+    Raises:
+        RebtError: The file cannot be used.
+    """
+
+    def __init__(self, tree: LearnedTree | str | Path) -> None:
+        self.learned = tree if isinstance(tree, LearnedTree) else read_tree(Path(tree))
+        """The tree."""
+        self._encoding = _Encoding(self.learned.features)
+        root = executable(self.learned.tree)
+        self._channels = nodes.policies(root)
+        self._ticked = not all(map(_is_reactive, self._channels.values()))
+        self._plans = {
+            channel: Plan(its, self.learned.features) for channel, its in self._channels.items()
+        }
+        self.reset()
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """The names of the features that a state has, in their order."""
+        return self._encoding.names
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        """The labels that the tree may answer with."""
+        return tuple(dict.fromkeys(one.label for one in nodes.actions(self.learned.tree)))
+
+    def reset(self, episodes: int | Sequence[int] = 1) -> None:
+        """Begins episodes, without any history.
+
+        Args:
+            episodes: How many there are from now on; or which ones of those there are begin anew.
+        """
+        if isinstance(episodes, int):
+            self._episodes = [_Episode(self.learned, self._ticked) for _ in range(episodes)]
+        else:
+            for one in episodes:
+                self._episodes[one] = _Episode(self.learned, self._ticked)
+
+    def act(self, state: State) -> Decision:
+        """What to do now in the first episode.
+
+        Args:
+            state: What is measured now; features that are not named are missing.
+
+        Raises:
+            InputError: It does not fit the features.
+        """
+        return self.act_many([state], [0])[0]
+
+    def act_many(
+        self, states: Sequence[State], episodes: Sequence[int] | None = None
+    ) -> list[Decision]:
+        """What to do now in several episodes.
+
+        Args:
+            states: What is measured now, one for each.
+            episodes: Numbers of the episodes, from 0, each once; by default all.
+
+        Returns:
+            A decision for each.
+
+        Raises:
+            InputError: There is not one state for each, or one does not fit the features.
+        """
+        numbers = range(len(self._episodes)) if episodes is None else episodes
+        if len(numbers) != len(states):
+            raise InputError(
+                f"there are {len(states)} states for {len(numbers)} episodes: call reset with the "
+                "number of episodes, and give one state for each."
+            )
+        acting = [self._episodes[number] for number in numbers]
+        present = [self._encoding.present(state) for state in states]
+        values = np.array(
+            [self._encoding.row(now, one.past) for now, one in zip(present, acting, strict=True)]
+        ).reshape(len(acting), len(self.learned.features))
+        for now, one in zip(present, acting, strict=True):
+            one.past.appendleft(now)
+        if self._ticked:
+            chosen = [one.tick(row) for one, row in zip(acting, values.tolist(), strict=True)]
+        else:
+            chosen = self._chosen(acting, values)
+        if len(self._channels) == 1:
+            [channel] = self._channels
+            return [one[channel] for one in chosen]
+        return list(chosen)
+
+    def _chosen(
+        self, acting: Sequence[_Episode], values: FloatArray
+    ) -> list[dict[str, str | None]]:
+        """What memoryless trees do, for all episodes at once."""
+        chosen: list[dict[str, str | None]] = [{} for _ in acting]
+        for channel, plan in self._plans.items():
+            histories = [one.histories[channel] for one in acting]
+
+            def holds(
+                condition: HistoryCondition, histories: Sequence[ActionHistory] = histories
+            ) -> BoolArray:
+                return np.array([holds_after(one, condition) for one in histories], dtype=bool)
+
+            codes = plan.choose(plan.actions, States(self.learned.features, values, holds))
+            for code, history, answer in zip(codes.tolist(), histories, chosen, strict=True):
+                answer[channel] = None if code < 0 else plan.actions[code].label
+                if code >= 0:
+                    history.take(plan.actions[code].label)
+        return chosen
+
+
+class _Episode:
+    """What has happened in one episode."""
+
+    def __init__(self, learned: LearnedTree, ticked: bool) -> None:
+        channels = {action.channel for action in learned.actions}
+        self.histories = {channel: ActionHistory() for channel in channels}
+        self.past: deque[list[float]] = deque(
+            maxlen=max((feature.lag for feature in learned.features), default=0)
+        )
+        tree = executable(learned.tree)
+        self._channels = tuple(nodes.policies(tree))
+        self._runtime = TreeRuntime(learned, tree=tree) if ticked else None
+
+    def tick(self, state: Sequence[float]) -> dict[str, str | None]:
+        """What the ticked tree does: on each channel the last action, as the executor sends it."""
+        assert self._runtime is not None
+        latest = {one.channel: one.label for one in self._runtime.tick(state).actions}
+        return {channel: latest.get(channel) for channel in self._channels}
+
+
+class _Encoding:
+    """States as a tree reads them: numbers, 0 or 1, positions in a feature's categories, NaN."""
+
+    def __init__(self, features: Sequence[Feature]) -> None:
+        present = [feature for feature in features if not feature.lag]
+        self.names = tuple(feature.name for feature in present)
+        self._present = present
+        self._codes = [
+            {name: float(code) for code, name in enumerate(feature.categories)}
+            for feature in present
+        ]
+        # `with_lags` has the features of the present row, then all of one row before, and so on.
+        self._count = len(present)
+        self._sources = [
+            (feature.lag, place % self._count) for place, feature in enumerate(features)
+        ]
+
+    def present(self, state: State) -> list[float]:
+        """The values of the features that do not look back."""
+        if isinstance(state, Mapping):
+            unknown = sorted(set(state) - set(self.names))
+            if unknown:
+                raise InputError(
+                    f"the state has {unknown[0]!r}, which is no feature of the tree: "
+                    f"it has {', '.join(self.names)}."
+                )
+            values = [state.get(name) for name in self.names]
+        else:
+            values = list(state)
+            if len(values) != self._count:
+                raise InputError(
+                    f"the state has {len(values)} values where the tree has {self._count} "
+                    f"features: {', '.join(self.names)}."
+                )
+        return [
+            self._number(feature, codes, value)
+            for feature, codes, value in zip(self._present, self._codes, values, strict=True)
+        ]
+
+    def row(self, now: list[float], past: Sequence[list[float]]) -> list[float]:
+        """The values of all features."""
+        return [
+            now[place] if not lag else past[lag - 1][place] if lag <= len(past) else math.nan
+            for lag, place in self._sources
+        ]
+
+    def _number(self, feature: Feature, codes: Mapping[str, float], value: Value) -> float:
+        if value is None:
+            return math.nan
+        if feature.kind is FeatureKind.CATEGORICAL:
+            # Categories that were never shown are as good as missing, like on the robot.
+            if isinstance(value, bool) and str(value) in codes:
+                return codes[str(value)]
+            text = value if isinstance(value, str) else category(float(value))
+            return codes.get(text, math.nan)
+        if isinstance(value, str):
+            raise InputError(
+                f"the feature {feature.name!r} is {feature.kind.value}, not the text {value!r}."
+            )
+        return float(value)
+
+
+def _is_reactive(tree: nodes.Node) -> bool:
+    """Whether a tick takes one action at most, and leaves nothing behind but the history."""
+    for node in nodes.walk(tree):
+        match node:
+            case nodes.Sequence(memory=True) | nodes.Selector(memory=True):
+                return False
+            case nodes.Repeater() | nodes.Parallel():
+                return False
+            case nodes.Inverter(child=child) if nodes.actions(child):
+                return False
+            case nodes.Sequence(children=children):
+                if any(nodes.actions(child) for child in children[:-1]):
+                    return False
+    return True

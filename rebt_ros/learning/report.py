@@ -1,0 +1,194 @@
+"""What a person must know about a learned tree before it drives.
+
+recall
+    Of an action: the share of its rows on which the tree takes it, in cross-validation.
+conflict
+    A row for which another row has an equal state and another action: there is no tree of the
+    state alone that does both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rebt_ros.arrays import IntArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.learning.cross_validation import JudgedLevels
+
+#: How well agreement in cross-validation ranks the trees of one task by their success (Spearman's
+#: rho): 0.6 where trees of the same demonstrations were compared, 0.2 over sets and numbers of
+#: demonstrations in docs/driving.md.
+FORECAST = "a weak one: rank correlation with success 0.2 to 0.6 within a task"
+
+#: Odd numbers that stir hashes of states.
+_GOLDEN, _ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD6E8FEB86659FD93)
+
+#: Conflicts that are mentioned: the share of the rows from which on they matter.
+_MENTIONED = 0.001
+
+
+@dataclass(frozen=True, slots=True)
+class ActionReport:
+    """What became of an action that was shown."""
+
+    label: str
+    rows: int
+    """On which it was shown."""
+    recall: float | None
+    """None where there were too few rows for cross-validation."""
+    taken: bool
+    """Whether the tree takes it anywhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class LearningReport:
+    """What a person must know about the policy of one channel."""
+
+    actions: tuple[ActionReport, ...]
+    mean_recall: float | None
+    agreement: float | None
+    """In cross-validation, after what the demonstrator did before: the forecast of success."""
+    most_frequent: float
+    """Share of the rows that always taking the most frequent action would agree with."""
+    conflicts: int
+    """Rows."""
+    conflicts_after_history: int
+    """Rows in conflict with others before which the same was done, where the tree may test it."""
+    rows: int
+
+    def notes(self) -> Iterator[str]:
+        """What should make a person look twice; no full stops."""
+        for action in self.actions:
+            if not action.taken:
+                yield (
+                    f"the tree never takes {action.label!r}, which was shown {action.rows} "
+                    f"{'times' if action.rows > 1 else 'time'}"
+                )
+        if self.conflicts > _MENTIONED * self.rows:
+            left = (
+                f" ({self.conflicts_after_history} also after the same action)"
+                if self.conflicts_after_history != self.conflicts
+                else ""
+            )
+            yield (
+                f"states alone do not decide: in {self.conflicts} of {self.rows} rows another "
+                f"action was shown in an equal state{left}"
+            )
+
+    def in_short(self) -> str:
+        """A sentence for a service's answer; empty where nothing was judged."""
+        if self.mean_recall is None or self.agreement is None:
+            return ""
+        worst = min(self.actions, key=lambda one: 1.0 if one.recall is None else one.recall)
+        return (
+            f"Forecast: {self.agreement:.1%} agreement in cross-validation ({FORECAST}); mean "
+            f"recall {self.mean_recall:.1%}, least {worst.recall:.1%} of {worst.label!r}."
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """For summary.json."""
+        return {
+            "recall": {one.label: one.recall for one in self.actions},
+            "rows_of_actions": {one.label: one.rows for one in self.actions},
+            "never_taken": [one.label for one in self.actions if not one.taken],
+            "cross_validated_mean_recall": self.mean_recall,
+            "cross_validated_agreement": self.agreement,
+            "most_frequent_action": self.most_frequent,
+            "conflicting_rows": self.conflicts,
+            "conflicting_rows_after_history": self.conflicts_after_history,
+        }
+
+    def figures(self) -> Mapping[str, str]:
+        """For /diagnostics."""
+        found = {f"recall of {one.label}": _share(one.recall) for one in self.actions}
+        return found | {
+            "mean recall": _share(self.mean_recall),
+            "forecast (agreement in cross-validation)": _share(self.agreement),
+            "share of the most frequent action": _share(self.most_frequent),
+            "never taken": ", ".join(one.label for one in self.actions if not one.taken) or "none",
+            "rows that states alone do not decide": str(self.conflicts),
+        }
+
+
+def report_on(
+    table: DemonstrationTable,
+    tree: nodes.Node,
+    history: History,
+    levels: JudgedLevels | None,
+    ccp_alpha: float,
+) -> LearningReport:
+    """Reports on a policy.
+
+    Args:
+        table: What it was learned from.
+        tree: The behavior tree.
+        history: What it may test of what was done before.
+        levels: The pruning levels in cross-validation, if there was one.
+        ccp_alpha: The level that was chosen.
+    """
+    shown = np.bincount(table.chosen, minlength=len(table.actions))
+    recalls: list[float | None] = [None] * len(shown)
+    mean_recall = agreement = None
+    if levels is not None:
+        level = levels.at(ccp_alpha)
+        mean_recall, agreement = float(levels.mean_recalls[level]), float(levels.means[level])
+        recalls = [None if np.isnan(one) else one for one in levels.recalls[level].tolist()]
+    taken = {action.label for action in nodes.actions(tree)}
+    states = _codes_of_states(table)
+    conflicts = after_history = _conflicts(states, table.chosen)
+    if history is History.PREVIOUS:
+        before = states * (len(table.actions) + 1) + table.previous + 1
+        after_history = _conflicts(before, table.chosen)
+    return LearningReport(
+        tuple(
+            ActionReport(label, rows, recall, label in taken)
+            for label, rows, recall in zip(table.actions, shown.tolist(), recalls, strict=True)
+            if rows
+        ),
+        mean_recall,
+        agreement,
+        float(shown.max() / len(table)),
+        conflicts,
+        after_history,
+        len(table),
+    )
+
+
+def _codes_of_states(table: DemonstrationTable) -> IntArray:
+    """A number for each row, equal for equal states, shape (rows,)."""
+    hashes = np.zeros(len(table), dtype=np.uint64)
+    # Column by column, so that a large table is not held a second time.
+    for column in table.states.T:
+        # 0 has two signs, and NaN many forms.
+        values = np.where(np.isnan(column), np.nan, column) + 0.0
+        hashes = _mixed(hashes + _GOLDEN) ^ _mixed(values.view(np.uint64))
+        hashes *= _ODD
+    return np.unique(hashes, return_inverse=True)[1].astype(np.int64)
+
+
+def _mixed(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
+    """Spreads each bit over all 64 (the finalizer of splitmix64, Steele et al., 2014)."""
+    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return bits ^ (bits >> np.uint64(31))
+
+
+def _conflicts(situations: IntArray, chosen: IntArray) -> int:
+    """Rows in whose situation several actions were chosen."""
+    _, of_row = np.unique(situations, return_inverse=True)
+    count = int(of_row.max()) + 1
+    least, most = np.full(count, np.iinfo(np.int64).max), np.full(count, -1, dtype=np.int64)
+    np.minimum.at(least, of_row, chosen)
+    np.maximum.at(most, of_row, chosen)
+    return int(np.sum((least != most)[of_row]))
+
+
+def _share(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.1%}"

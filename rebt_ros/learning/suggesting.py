@@ -1,0 +1,183 @@
+"""Which suggested alternate expressive subtrees (SAES) to offer with a tree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import Suggestion
+from rebt_ros.beyond_the_paper.priority_root import MOST_LEAVES_MINIMIZED
+from rebt_ros.beyond_the_paper.routines.finding import FoundRoutine, find_routines
+from rebt_ros.decision_tree.encoding import Vocabulary
+from rebt_ros.decision_tree.training import TrainedTree, fit
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.table import DemonstrationTable, part_of
+from rebt_ros.learning.options import LearnOptions
+from rebt_ros.learning.suggestions import (
+    attach,
+    going_on_after_loops,
+    lat_suggestions,
+    mark,
+    psa_suggestions,
+    resolve,
+    routine_suggestions,
+)
+from rebt_ros.paper.lat_occurrences import rows
+from rebt_ros.paper.lat_trees import Demonstrated, LatTrees, gen_lat_trees
+from rebt_ros.paper.re_bt_espresso import build_inv_set, logic_minimizer, reduce_floats
+from rebt_ros.paper.rules import dt_to_rules_psa
+
+#: More than a person wants to look through, and how many of them may be routines.
+_MOST_SUGGESTIONS = 12
+_MOST_ROUTINES = 8
+#: Repeaters of single loops, in the paper's mode and beside routines: where no routines are found,
+#: rows are samples, and an action that is done for long is no loop.
+_MOST_LOOPS, _LOOPS_BESIDE_ROUTINES = 24, 4
+_TOO_LARGE = (
+    f"no PSA nodes and LAT trees are suggested for more than {MOST_LEAVES_MINIMIZED} leaves: prune "
+    "more"
+)
+
+#: Rows in which LAT paths are counted: what has not occurred in so many is no habit, and counting
+#: nested loops takes longer than learning does in many more.
+_MOST_ROWS = 100_000
+#: Rows that the LAT-augmented tree is fitted to.
+_MOST_ROWS_FITTED = 5_000
+
+
+def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[FoundRoutine, ...]:
+    """Routines in a table, if they are asked for; they are the same at all pruning levels."""
+    return find_routines(table) if options.routines else ()
+
+
+def demonstrated_in(table: DemonstrationTable) -> Demonstrated:
+    """What was done in a table, row by row; it is the same at all pruning levels.
+
+    Of a large table, only in its first rows.
+    """
+    return Demonstrated(rows(table.where(np.arange(len(table)) < _MOST_ROWS)))
+
+
+def suggest(
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    ccp_alpha: float,
+    options: LearnOptions,
+    routines: Sequence[FoundRoutine] = (),
+    demonstrated: Demonstrated | None = None,
+) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
+    """What to offer: PSA nodes of the tree, and what a LAT-augmented tree tells about sequences.
+
+    Args:
+        table: The rows that were learned from.
+        trained: The decision tree of the main tree.
+        ccp_alpha: How far the LAT-augmented decision tree is pruned.
+        options: How to learn.
+        routines: What `routines_of` found in the table.
+        demonstrated: What `demonstrated_in` makes of the table, which saves time where several
+            trees are learned from it.
+
+    Returns:
+        At most twelve suggestions, routines first, then the best supported (all of them in the
+        paper's mode), and notes on what was left out.
+    """
+    found = routine_suggestions(routines[:_MOST_ROUTINES])
+    left_out = len(routines) - len(found)
+    if _too_large(trained, options):
+        return found, (_TOO_LARGE, *_on_left_out(left_out))
+    with_lat = trained
+    if trained.vocabulary.history is not History.LAST:
+        fitted = fit(
+            table if options.is_paper else part_of(table, _MOST_ROWS_FITTED),
+            vocabulary=Vocabulary(History.LAST),
+            max_depth=options.max_depth,
+            random_state=options.random_state,
+            upsample=options.upsample,
+        )
+        with_lat = fitted.at(ccp_alpha)
+    if _too_large(with_lat, options):
+        return found, (_TOO_LARGE, *_on_left_out(left_out))
+    offered, lat_trees = _of_rules(table, trained, with_lat, options, routines, demonstrated)
+    left_out += lat_trees.left_out.paths + lat_trees.left_out.loops
+    room = _MOST_SUGGESTIONS - len(found)
+    if not options.is_paper and len(offered) > room:
+        loops = {tree.subtree for tree in lat_trees.loops}
+        ranked = sorted(offered, key=lambda one: (one.subtree not in loops, -one.support))
+        left_out += len(ranked) - room
+        offered = tuple(ranked[:room])
+    notes = _on_left_out(left_out)
+    if len(table) > _MOST_ROWS:
+        notes = (*notes, f"suggestions were counted in the first {_MOST_ROWS} rows alone")
+    return (*found, *offered), notes
+
+
+def _on_left_out(suggestions: int) -> tuple[str, ...]:
+    """The note on so many."""
+    if not suggestions:
+        return ()
+    return (f"{suggestions} more, less supported suggestions are left out",)
+
+
+def _too_large(trained: TrainedTree, options: LearnOptions) -> bool:
+    """Whether minimizing the rules of a tree would take minutes; the paper's mode does it."""
+    return not options.is_paper and trained.tree.leaves > MOST_LEAVES_MINIMIZED
+
+
+def _of_rules(
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    with_lat: TrainedTree,
+    options: LearnOptions,
+    routines: Sequence[FoundRoutine],
+    demonstrated: Demonstrated | None,
+) -> tuple[tuple[Suggestion, ...], LatTrees]:
+    """PSA and LAT suggestions, and the LAT trees that they are made of.
+
+    Args:
+        table: The rows that were learned from.
+        trained: The decision tree of the main tree.
+        with_lat: The one that may test LAT.
+        options: How to learn.
+        routines: Which there are.
+        demonstrated: What was done in the table, if that is known.
+    """
+    psa_rules = reduce_floats(logic_minimizer(dt_to_rules_psa(trained.tree, options.delta)))
+    rules = dt_to_rules_psa(with_lat.tree, options.delta)
+    lat_trees = gen_lat_trees(
+        reduce_floats(logic_minimizer(rules)),
+        demonstrated or demonstrated_in(table),
+        inv_set=build_inv_set(rules),
+        least_support=0 if options.is_paper else 1,
+        most_loops=_MOST_LOOPS if options.is_paper else _LOOPS_BESIDE_ROUTINES * bool(routines),
+    )
+    offered = (
+        *psa_suggestions(psa_rules),
+        *lat_suggestions((*lat_trees.trees, *lat_trees.loops)),
+    )
+    return offered, lat_trees
+
+
+def accept(
+    tree: nodes.Node, suggestions: tuple[Suggestion, ...], options: LearnOptions
+) -> tuple[nodes.Node, tuple[Suggestion, ...]]:
+    """The tree with what the user attaches, its PSA nodes as the user wants them.
+
+    In the paper's mode subtrees are attached as printed.  Otherwise they come before the rules,
+    which cover every state, and a Sequence goes on when a loop in it has ended.
+
+    Raises:
+        OptionError: There is no suggestion with such an id.
+    """
+    if options.attach:
+        printed = options.is_paper
+        runnable = tuple(
+            one if printed else replace(one, subtree=going_on_after_loops(one.subtree))
+            for one in suggestions
+        )
+        tree = attach(tree, runnable, options.attach, root=options.root, in_front=not printed)
+    if options.psa_choice is not None:
+        tree = resolve(tree, options.psa_choice)
+    return tree, mark(suggestions, options.attach)

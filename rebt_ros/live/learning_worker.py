@@ -1,0 +1,221 @@
+"""What runs in a `LearningProcess`: it learns whenever a line on its standard input asks it to.
+
+It ends with the node that started it, whatever way that ends, and it stands back for the nodes: it
+yields the processor to them, and where memory runs out it is ended before them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import json
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from rebt_ros.errors import OptionError, RebtError
+from rebt_ros.live.learning_process import Lesson, Progress, Request
+
+if TYPE_CHECKING:
+    from rebt_ros.learning.pipeline import Learning
+    from rebt_ros.offline.learn_and_replay import OfflineLearning
+
+#: Of all the work, what reading the recordings is.
+_READING: Final = 0.1
+
+#: How much later than a node it gets the processor, and how much sooner it is ended where memory
+#: runs out (see nice(2), sched(7) and proc(5)); its session has to stand back as well as itself.
+_NICENESS: Final = 5
+_OUT_OF_MEMORY_SCORE: Final = "500"
+
+#: Linux's PR_SET_PDEATHSIG.
+_SET_PARENT_DEATH_SIGNAL: Final = 1
+
+Tell = Callable[[Progress], None]
+
+
+def main(node: int) -> None:
+    """Learns until its input ends.
+
+    Args:
+        node: Process id of the node that started it.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _end_with(node)
+    _stand_back()
+    # What a library may print must not come between the replies.
+    replies = os.fdopen(os.dup(sys.stdout.fileno()), "wb", buffering=0)
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+
+    def say(line: dict[str, Any]) -> None:
+        try:
+            replies.write(json.dumps(line).encode() + b"\n")
+        except BrokenPipeError:
+            os._exit(0)
+
+    _warm_up()
+    for line in sys.stdin.buffer:
+        say(_reply(line, lambda progress: say(asdict(progress))))
+
+
+def _end_with(node: int) -> None:
+    """Ends this process with the node, also while it learns or is stuck in a library.
+
+    Elsewhere than on Linux it learns to the end, and finds then that its input has ended.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+        if os.getppid() != node:
+            os._exit(0)
+
+
+def _stand_back() -> None:
+    os.nice(_NICENESS)
+    settings = {"oom_score_adj": _OUT_OF_MEMORY_SCORE, "autogroup": str(_NICENESS)}
+    for name, value in settings.items():
+        # Not every kernel has them.
+        with contextlib.suppress(OSError):
+            Path("/proc/self", name).write_text(value)
+
+
+def _warm_up() -> None:
+    """Imports what takes long to import; what is missing is reported once it is asked for."""
+    try:
+        import rebt_ros.learning.pipeline  # noqa: F401
+    except ImportError:
+        return
+
+
+def _reply(line: bytes, tell: Tell) -> dict[str, Any]:
+    try:
+        return asdict(learn(Request(**json.loads(line)), tell))
+    except RebtError as err:
+        return {"error": str(err)}
+    except ImportError as err:
+        return {"error": f"{err.name or err} is not installed: install it and call again."}
+    except MemoryError:
+        return {"error": "the memory does not suffice: learn from fewer demonstrations."}
+    except Exception as err:
+        traceback.print_exc()
+        return {
+            "error": f"learning failed, which is a mistake in rebt_ros ({type(err).__name__}: "
+            f"{err}): please report it, with the learner's log."
+        }
+
+
+def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
+    """Learns from all recordings of a directory, in this process.
+
+    Args:
+        request: What to learn.
+        tell: Told how far it is.
+
+    Raises:
+        RebtError: They cannot be used, or an option makes no sense.
+    """
+    from rebt_ros.behavior_tree.document import dumps
+    from rebt_ros.behavior_tree.learned_tree import Root
+    from rebt_ros.decision_tree.upsampling import Upsampling
+    from rebt_ros.demonstration.last_action import History
+    from rebt_ros.demonstration.schema import FeatureKind
+    from rebt_ros.demonstration.table import tabulate
+    from rebt_ros.learning import pipeline
+    from rebt_ros.learning.options import LearnOptions, Use
+    from rebt_ros.offline import learn_and_replay
+    from rebt_ros.storage.recording import read_recording, recordings
+
+    twice = set(request.binary_features) & set(request.categorical_features)
+    if twice:
+        raise OptionError(f"feature {min(twice)!r} cannot be both binary and categorical.")
+    declared = {
+        **dict.fromkeys(request.binary_features, FeatureKind.BINARY),
+        **dict.fromkeys(request.categorical_features, FeatureKind.CATEGORICAL),
+    }
+    kinds: dict[str, type[Enum]] = {
+        "root": Root,
+        "psa": Use,
+        "history": History,
+        "differences": Use,
+        "upsample": Upsampling,
+    }
+    chosen: dict[str, Any] = {
+        name: kinds[name](value) if name in kinds and value is not None else value
+        for name, value in request.options.items()
+    }
+    options = LearnOptions(**chosen)
+    paths = recordings(Path(request.demonstrations))
+    reads = []
+    for place, path in enumerate(paths):
+        tell(Progress("reading", _READING * place / len(paths)))
+        reads.append(read_recording(path))
+    tables = tabulate([read.demonstration for read in reads], declared)
+    learnings = pipeline.learn_channels(
+        tables,
+        options,
+        lambda stage, share: tell(Progress(stage, _READING + (1.0 - _READING) * share)),
+    )
+    learned = pipeline.side_by_side(learnings)
+    notes = [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
+    notes += [note for learning in learnings for note in learning.notes]
+    led = {
+        f"{learning.table.channel}: " if len(learnings) > 1 else "": learning.report
+        for learning in learnings
+    }
+    sentences = [f"{channel}{one.in_short()}" for channel, one in led.items() if one.in_short()]
+    return Lesson(
+        dumps(learned),
+        " ".join((pipeline.summary_sentence(learned), *sentences)),
+        notes,
+        {
+            f"{channel}{name}": value
+            for channel, one in led.items()
+            for name, value in one.figures().items()
+        },
+        learned.provenance.figures.own_history_agreement,
+        _files(learn_and_replay.OfflineLearning(learned, learnings, tuple(notes))),
+        _agreement_of(request.published, learnings),
+    )
+
+
+def _files(result: OfflineLearning) -> dict[str, str]:
+    """What `learn` writes beside the tree, but for PNG files."""
+    from rebt_ros.drawing.dot import render_dot
+    from rebt_ros.drawing.svg import render_svg
+    from rebt_ros.drawing.text import render_text
+    from rebt_ros.offline import learn_and_replay
+
+    summary = learn_and_replay.summarize(result) | {"notes": list(result.notes)}
+    return {
+        "tree.txt": render_text(result.learned),
+        "tree.svg": render_svg(result.learned),
+        "tree.dot": render_dot(result.learned),
+        "summary.json": json.dumps(summary, indent=2, ensure_ascii=False) + "\n",
+    }
+
+
+def _agreement_of(document: str, learnings: Sequence[Learning]) -> float | None:
+    """Agreement of the published tree with all rows that were held out."""
+    from rebt_ros.behavior_tree.document import loads
+    from rebt_ros.learning.replaying import agreement_on
+
+    if not document:
+        return None
+    published = loads(document)
+    agreeing = rows = 0.0
+    for learning in learnings:
+        held_out = learning.table.where(learning.held_out)
+        agreement = agreement_on(published, held_out)
+        if agreement is None:
+            return None
+        agreeing, rows = agreeing + agreement * len(held_out), rows + len(held_out)
+    return agreeing / rows if rows else None
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -1,0 +1,1 @@
+"""Learning from files and replay over files, and the files that are written."""

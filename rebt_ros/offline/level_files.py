@@ -1,0 +1,217 @@
+"""The files of learned trees and of their families.
+
+A directory describes one learning: pictures and levels of an earlier one do not stay beside it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.decision_tree.tree import DecisionTree
+from rebt_ros.drawing.accuracy_plot import AccuracyCurve, PlotFormat, render_accuracy_plot
+from rebt_ros.drawing.decision_tree_dot import render_decision_tree_dot
+from rebt_ros.drawing.decision_tree_svg import render_decision_tree_svg
+from rebt_ros.drawing.dot import render_dot
+from rebt_ros.drawing.errors import PictureError
+from rebt_ros.drawing.svg import render_svg
+from rebt_ros.drawing.tree_png import render_decision_tree_png, render_png
+from rebt_ros.learning.levels import Family, Level
+from rebt_ros.learning.pipeline import Learning, Progress
+from rebt_ros.storage.atomic import write_bytes_atomically, write_text_atomically
+from rebt_ros.storage.tree_file import write_tree
+
+_LEVELS, _SUMMARY = "levels", "summary.json"
+_PLOT = "accuracy_vs_alpha"
+#: Longest directory of a channel (characters); its name in full is in the documents.
+_LONGEST_NAME = 100
+#: Families that take more room say so.
+_MENTIONED_MEGABYTES = 50
+_LEVEL_FILES = (
+    "tree.json",
+    "tree.svg",
+    "tree.dot",
+    "tree.png",
+    "decision_tree.svg",
+    "decision_tree.dot",
+    "decision_tree.png",
+)
+
+
+def write_behavior_tree(directory: Path, learned: LearnedTree) -> list[str]:
+    """Writes tree.json, tree.svg, tree.dot, and tree.png where possible.
+
+    Returns:
+        Notes on what could not be made; no full stops.
+    """
+    write_tree(directory / "tree.json", learned)
+    write_text_atomically(directory / "tree.svg", render_svg(learned))
+    write_text_atomically(directory / "tree.dot", render_dot(learned))
+    return _write_picture(directory / "tree.png", partial(render_png, learned))
+
+
+def write_decision_tree(directory: Path, tree: DecisionTree) -> list[str]:
+    """Writes decision_tree.svg, decision_tree.dot, and decision_tree.png where possible.
+
+    Returns:
+        Notes on what could not be made; no full stops.
+    """
+    path = directory / "decision_tree"
+    write_text_atomically(path.with_suffix(".svg"), render_decision_tree_svg(tree))
+    write_text_atomically(path.with_suffix(".dot"), render_decision_tree_dot(tree))
+    return _write_picture(path.with_suffix(".png"), partial(render_decision_tree_png, tree))
+
+
+def channel_directories(learnings: Sequence[Learning]) -> Iterator[tuple[Path, Learning]]:
+    """Where the files of each channel's policy go, relative to those of the whole tree."""
+    if len(learnings) == 1:
+        yield Path(), learnings[0]
+        return
+    taken: set[str] = set()
+    for learning in learnings:
+        # Channels are topics, whose slashes would make directories of their own.
+        name = (
+            re.sub("[^A-Za-z0-9_-]+", "_", learning.table.channel).strip("_")[:_LONGEST_NAME]
+            or "channel"
+        )
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        yield Path("channels", name), learning
+
+
+def write_family(directory: Path, family: Family, most: int, progress: Progress) -> list[str]:
+    """Writes levels/NN/ for each pruning level, levels/summary.json and the plot.
+
+    Args:
+        directory: Where to.
+        family: Of the tree that was learned.
+        most: Levels to write at most.
+        progress: Told what is being done and which share of the work is behind.
+
+    Returns:
+        Notes on what was left out, each once; no full stops.
+
+    Raises:
+        OptionError: `most` is too small.
+        StorageError: A file cannot be written.
+    """
+    numbers = family.selected(most)
+    clear_family(directory)
+    width = max(2, len(str(len(family.ccp_alphas) - 1)))
+    notes = list(_selection_notes(family, numbers))
+    entries, simpler = [], 0
+    for place, number in enumerate(numbers):
+        progress(f"level {place + 1} of {len(numbers)}", place / len(numbers))
+        level = family.level(number)
+        name = f"{number:0{width}d}"
+        notes += write_behavior_tree(directory / _LEVELS / name, level.learned)
+        notes += write_decision_tree(directory / _LEVELS / name, level.decision_tree)
+        entries.append(_entry(name, level))
+        simpler += not level.reduced
+    if simpler:
+        notes.append(
+            f"the {simpler} largest of these levels were made without the domain's don't-cares, "
+            "which would take too long"
+        )
+    text = json.dumps(entries, indent=2, ensure_ascii=False)
+    write_text_atomically(directory / _LEVELS / _SUMMARY, text + "\n")
+    notes += _write_plot(directory, family)
+    megabytes = _size(directory / _LEVELS) / 1e6
+    if megabytes > _MENTIONED_MEGABYTES:
+        notes.append(f"the levels take {megabytes:.0f} MB; a smaller --most-levels takes less")
+    return list(dict.fromkeys(notes))
+
+
+def clear_family(directory: Path) -> None:
+    """Takes away the family that an earlier learning wrote here, and nothing else."""
+    levels = directory / _LEVELS
+    for form in PlotFormat:
+        (directory / f"{_PLOT}.{form.value}").unlink(missing_ok=True)
+    if levels.is_dir():
+        for level in levels.iterdir():
+            if level.name.isdecimal() and level.is_dir():
+                for name in _LEVEL_FILES:
+                    (level / name).unlink(missing_ok=True)
+                _remove_if_empty(level)
+        (levels / _SUMMARY).unlink(missing_ok=True)
+        _remove_if_empty(levels)
+
+
+def _size(directory: Path) -> int:
+    return sum(path.stat().st_size for path in directory.rglob("*") if path.is_file())
+
+
+def _remove_if_empty(directory: Path) -> None:
+    with contextlib.suppress(OSError):
+        directory.rmdir()
+
+
+def _entry(name: str, level: Level) -> dict[str, Any]:
+    tree, figures = level.learned.tree, level.learned.provenance.figures
+    judged = level.cross_validated
+    return {
+        "level": name,
+        "ccp_alpha": level.ccp_alpha,
+        "leaves": level.leaves,
+        "nodes": nodes.size(tree),
+        "depth": nodes.depth(tree),
+        "actions": [action.label for action in nodes.actions(tree)],
+        "fidelity_mismatches": figures.fidelity_mismatches,
+        "teacher_forced_agreement": figures.teacher_forced_agreement,
+        "own_history_agreement": figures.own_history_agreement,
+        "cross_validated_mean_recall": judged.recall if judged else None,
+        "cross_validated_agreement": judged.agreement if judged else None,
+        "cross_validated_standard_error": judged.standard_error if judged else None,
+        "all_reductions": level.reduced,
+        "best": level.best,
+        "chosen": level.chosen,
+    }
+
+
+def _selection_notes(family: Family, numbers: tuple[int, ...]) -> Iterator[str]:
+    count = len(family.ccp_alphas)
+    if len(numbers) < count:
+        yield (
+            f"{len(numbers)} of {count} pruning levels were written, evenly spread, and "
+            f"{count - len(numbers)} left out; --most-levels {count} writes all"
+        )
+
+
+def _write_plot(directory: Path, family: Family) -> list[str]:
+    policy = family.learning.policy
+    judged = policy.levels
+    if judged is None:
+        return [f"there is no {_PLOT}, as there were too few rows for cross-validation"]
+    curve = AccuracyCurve(
+        judged.ccp_alphas,
+        judged.means,
+        judged.standard_errors,
+        # The levels of another fit may have been judged: each comes to one of this tree.
+        family.leaves[np.searchsorted(family.ccp_alphas, judged.ccp_alphas, side="right") - 1],
+        policy.ccp_alpha,
+    )
+    notes: list[str] = []
+    for form in PlotFormat:
+        path = directory / f"{_PLOT}.{form.value}"
+        notes += _write_picture(path, partial(render_accuracy_plot, curve, form))
+    return notes
+
+
+def _write_picture(path: Path, render: Callable[[], bytes]) -> list[str]:
+    """Writes a picture, or takes an older one away and says why there is none."""
+    try:
+        write_bytes_atomically(path, render())
+    except PictureError as err:
+        path.unlink(missing_ok=True)
+        return [str(err).removesuffix(".")]
+    return []

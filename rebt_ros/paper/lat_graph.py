@@ -1,0 +1,127 @@
+"""The graph of actions and last actions taken (Algorithm 2, line 2: GENERATE_GRAPH).
+
+node
+    An action of a rule, or its PSA group of actions (`ActionNode`); once cycles are removed, also
+    a cycle of such nodes (`CycleNode`).
+edge
+    From u to v where the rule of v has a conjunction with the literal ``LAT = a`` and a is an
+    action of u: it was shown that v follows u.
+
+A PSA group is one node and stands for each of its members.  Where a member is the last action
+taken, the edge comes from every node that has it: from the group and, if the action has a rule of
+its own or is in other groups, from those as well, since LAT does not tell which rule took it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rebt_ros.behavior_tree.nodes import Action
+from rebt_ros.logic.conditions import LastActionIs
+from rebt_ros.logic.dnf import Conjunction
+from rebt_ros.paper.rules import Rule
+
+
+@dataclass(frozen=True, slots=True)
+class ActionNode:
+    """The action of a rule, or its PSA group."""
+
+    actions: tuple[Action, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the actions that it takes."""
+        return tuple(action.label for action in self.actions)
+
+    @property
+    def nesting(self) -> int:
+        """How many cycles lie within each other here: none."""
+        return 0
+
+
+@dataclass(frozen=True, slots=True)
+class CycleNode:
+    """A cycle that was replaced by one node; it is its own entry of the paper's lookup table."""
+
+    path: tuple[GraphNode, ...]
+    """Its nodes from the start node on, the last of which leads back to the first."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the actions that it takes, each once."""
+        return tuple(dict.fromkeys(label for node in self.path for label in node.labels))
+
+    @property
+    def nesting(self) -> int:
+        """How many cycles lie within each other here, itself included."""
+        return 1 + max(node.nesting for node in self.path)
+
+
+GraphNode: TypeAlias = ActionNode | CycleNode
+
+
+@dataclass(frozen=True, slots=True)
+class LatGraph:
+    """A directed graph; nodes and edges are ordered, so that all that follows is too."""
+
+    nodes: tuple[GraphNode, ...]
+    edges: tuple[tuple[int, int], ...]
+    """Positions in `nodes`, each pair once, ascending."""
+
+    def __post_init__(self) -> None:
+        if sorted(set(self.edges)) != list(self.edges):
+            raise ValueError("the edges must be ascending, each pair once")
+        if not all(0 <= place < len(self.nodes) for edge in self.edges for place in edge):
+            raise ValueError("an edge names a node that does not exist")
+
+    def pairs(self) -> Iterator[tuple[GraphNode, GraphNode]]:
+        """The edges as pairs of nodes."""
+        return ((self.nodes[before], self.nodes[after]) for before, after in self.edges)
+
+
+def generate_graph(rules: Iterable[Rule]) -> LatGraph:
+    """GENERATE_GRAPH: one node per rule, an edge per LAT action of its conjunctions.
+
+    Args:
+        rules: With minimized, unfactored DNFs: factoring can move a LAT literal out of its
+            conjunction.  No two rules trigger the same actions.
+
+    Returns:
+        The graph in the order of the rules, self-loops included: a PSA group leads to itself where
+        one of its members was shown after another one.  A LAT action that no rule triggers has no
+        node, so no edge comes from it.
+    """
+    rules = [rule for rule in rules if rule.dnf.conjunctions]
+    nodes = tuple(ActionNode(rule.actions) for rule in rules)
+    if len(set(nodes)) != len(nodes):
+        raise ValueError("two rules trigger the same actions: join them")
+    having: dict[str, list[int]] = {}
+    for place, node in enumerate(nodes):
+        for label in node.labels:
+            having.setdefault(label, []).append(place)
+    edges = {
+        (before, after)
+        for after, rule in enumerate(rules)
+        for conjunction in rule.dnf
+        if (last := last_action(conjunction, nodes[after])) is not None
+        for before in having.get(last, ())
+    }
+    return LatGraph(nodes, tuple(sorted(edges)))
+
+
+def last_action(conjunction: Conjunction, node: ActionNode) -> str | None:
+    """The LAT action of a conjunction of the node's rule.
+
+    None where there is no positive LAT literal, and where the conjunction can never hold: LAT is
+    one action at a time, and differs from the action that is being decided.
+    """
+    named = {
+        literal.condition.action
+        for literal in conjunction
+        if literal.positive and isinstance(literal.condition, LastActionIs)
+    }
+    if len(named) != 1 or named == set(node.labels):
+        return None
+    return named.pop()

@@ -1,0 +1,1 @@
+"""The executor: a behavior tree and live topics in, commands out."""

@@ -1,0 +1,148 @@
+"""The executor's parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rclpy.node import Node
+
+from rebt_ros.live.novelty_guard import Novelty
+from rebt_ros.ros.parameters import Parameters, at_home, nanoseconds
+
+
+@dataclass(frozen=True, slots=True)
+class TakeoverSettings:
+    """How a person takes over."""
+
+    topics: tuple[str, ...]
+    timeout: int
+    """How long the tree rests after a message of the person, nanoseconds; 0: nobody can."""
+
+
+@dataclass(frozen=True, slots=True)
+class NoveltySettings:
+    """What is done about states outside what was shown."""
+
+    mode: Novelty
+    margin: float
+    """In shares of all that was shown of a feature."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutorSettings:
+    """What the executor was started with; durations in nanoseconds."""
+
+    tree_file: Path | None
+    rate: float
+    """Ticks per second."""
+    tick_on_state: bool
+    """Whether a state is ticked on when it arrives; `rate` is then that of ticks without one."""
+    state_timeout: int
+    state_topic: str
+    every_tick: bool
+    """Whether a command is sent at every tick, or only when it changes."""
+    enabled: bool
+    action_result_topic: str
+    halt_action: str
+    """Empty for none."""
+    takeover: TakeoverSettings
+    novelty: NoveltySettings
+
+
+def declare_settings(node: Node) -> ExecutorSettings:
+    """Declares and reads the parameters.
+
+    Raises:
+        OptionError: One makes no sense.
+    """
+    declare = Parameters(node)
+    tree_file = declare.text(
+        "tree_file", "", "Behavior tree document to begin with; empty for none."
+    )()
+    rate = declare.number(
+        "rate",
+        20.0,
+        "Ticks per second; the recording's sample rate if the tree has lagged features.",
+        0.1,
+        1000.0,
+    )()
+    state_timeout = declare.number(
+        "state_timeout", 0.5, "How long a state message is good for (seconds).", 0.001, 3600.0
+    )()
+    publish = declare.text(
+        "publish",
+        "every_tick",
+        "When to send the command.",
+        choices=("every_tick", "on_change"),
+    )()
+    tick_on = declare.text(
+        "tick_on",
+        "timer",
+        "When to tick: timer, or state to tick when a state message arrives, and at the rate while "
+        "none does.",
+        choices=("timer", "state"),
+    )()
+    return ExecutorSettings(
+        tree_file=at_home("tree_file", tree_file) if tree_file else None,
+        rate=rate,
+        tick_on_state=tick_on == "state",
+        state_timeout=nanoseconds(state_timeout),
+        state_topic=declare.text(
+            "state_topic", "state", "State topic of a tree that was learned from a table."
+        )(),
+        every_tick=publish == "every_tick",
+        enabled=declare.flag(
+            "enabled", False, "Whether to command the robot from the start, see ~/enable."
+        )(),
+        action_result_topic=declare.text(
+            "action_result_topic",
+            "",
+            "String topic that says 'success' or 'failure' (or 'label:success') when an action "
+            "has ended; empty if an action is done once its command is out.",
+        )(),
+        halt_action=declare.text(
+            "halt_action",
+            "",
+            "Command that is sent once when the tree is halted, such as 'stop'; empty for none.",
+        )(),
+        takeover=_takeover(declare),
+        novelty=_novelty(declare),
+    )
+
+
+def _takeover(declare: Parameters) -> TakeoverSettings:
+    topics = declare.texts(
+        "takeover_topics",
+        ["action"],
+        "String topics on which a person takes over; a tree's channel of that name learns from "
+        "them what was done.",
+    )()
+    timeout = declare.number(
+        "takeover_timeout",
+        1.0,
+        "How long after the last message of a person the tree rests (seconds); 0.0: nobody can "
+        "take over.",
+        0.0,
+        3600.0,
+    )()
+    return TakeoverSettings(topics if timeout else (), nanoseconds(timeout))
+
+
+def _novelty(declare: Parameters) -> NoveltySettings:
+    mode = declare.text(
+        "novelty",
+        Novelty.WARN.value,
+        "What to do in a state outside what was shown: hold halts the tree until a person takes "
+        "over.",
+        choices=[one.value for one in Novelty],
+    )()
+    margin = declare.number(
+        "novelty_margin",
+        0.1,
+        "How far a feature may lie outside of what was shown in such states, as a share of all "
+        "that was shown of it.",
+        0.0,
+        100.0,
+    )()
+    return NoveltySettings(Novelty(mode), margin)

@@ -1,0 +1,1 @@
+"""The learner: demonstrations in, a behavior tree out."""

@@ -1,0 +1,324 @@
+"""The learner: learns a behavior tree from the recordings when it is asked to, and publishes it."""
+
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.document import dumps, loads
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.errors import RebtError
+from rebt_ros.live.learning_process import (
+    LearningCancelledError,
+    LearningError,
+    LearningProcess,
+    Lesson,
+    Progress,
+)
+from rebt_ros.ros import lifetime
+from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
+from rebt_ros.ros.graph_watch import GraphWatch
+from rebt_ros.ros.learner.settings import declare_settings
+from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.tree_file import find_tree
+from rebt_ros.storage.tree_versions import TreeVersions
+
+#: Who subscribes later gets the latest tree, too.
+TREE_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+_TREE_FILE: Final = "tree.json"
+
+#: One thread learns, one waits for the end of what it cancels, and others answer further calls,
+#: parameters, and diagnostics.
+_THREADS: Final = 5
+
+#: What comes once nothing can be cancelled any more.
+_PUBLISHING: Final = Progress("publishing", 1.0)
+
+#: So many notes are part of the answer; all of them are in the log.
+_NOTES_ANSWERED: Final = 3
+
+#: How long the end of the node waits for a call that is under way (seconds).
+_LAST_ANSWER: Final = 1.0
+
+
+class LearnerNode(Node):
+    """Offers ``~/relearn`` and ``~/cancel``; learning takes place in a `LearningProcess`.
+
+    A tree that was learned is written to disk first and published then; when learning fails, the
+    tree before it stays in both places.
+
+    Raises:
+        OptionError: A parameter makes no sense.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("learner")
+        self._lock = threading.Lock()
+        self._call: _Call | None = None
+        self._last = Report(Level.OK, "idle: nothing was learned yet")
+        self._learned: LearnedTree | None = None
+        self._figures: Mapping[str, str] = {}
+        self._watch = GraphWatch(self)
+        self._settings = declare_settings(self)
+        self._publisher = self.create_publisher(String, "behavior_tree", TREE_QOS)
+        self._publish_what_is_on_disk()
+        self._process = LearningProcess()
+        try:
+            self._process.start()
+        except LearningError as err:
+            # There may be room for it once somebody wants it to learn.
+            self.get_logger().warning(str(err))
+        self._diagnostics = Diagnostics(
+            self, "learning", self._report, MutuallyExclusiveCallbackGroup()
+        )
+        group = ReentrantCallbackGroup()
+        self.create_service(Trigger, "~/relearn", self._relearn, callback_group=group)
+        self.create_service(Trigger, "~/cancel", self._cancel, callback_group=group)
+        self.create_service(Trigger, "~/rollback", self._rollback, callback_group=group)
+
+    def interrupt(self) -> None:
+        """Ends the learning process, also while it learns, and with it a call of ~/relearn."""
+        self._process.close()
+
+    def close(self) -> None:
+        """Waits for a tree that is being written."""
+        self._process.close()
+        call = self._call
+        if call is not None:
+            call.over.wait(_LAST_ANSWER)
+
+    def _relearn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        call = _Call()
+        with self._lock:
+            other = self._call
+            if other is None:
+                self._call = call
+        if other is not None:
+            response.message = (
+                f"busy: {other}; call again when that is done, or ~/cancel to cancel it."
+            )
+            return response
+        try:
+            response.message = self._learn(call)
+            response.success = True
+            self._end(Level.OK, response.message)
+        except LearningCancelledError as err:
+            response.message = str(err)
+            self._end(Level.OK, response.message)
+        except RebtError as err:
+            response.message = str(err)
+            self._end(Level.WARN, response.message)
+        except Exception as err:
+            # The node lives on.  Once its context is shut down, all that rclpy does raises.
+            if self.context.ok():
+                response.message = (
+                    f"learning failed, which is a mistake in rebt_ros ({type(err).__name__}: "
+                    f"{err}): please report it, with the learner's log."
+                )
+                self.get_logger().error(traceback.format_exc())
+                self._end(Level.ERROR, response.message)
+        finally:
+            with self._lock:
+                self._call = None
+            call.over.set()
+        return response
+
+    def _end(self, level: Level, message: str) -> None:
+        """Notes how a call ended."""
+        self._last = Report(level, message)
+        # On two lines: rclpy refuses another severity from the same one.
+        if level is Level.OK:
+            self.get_logger().info(message)
+        else:
+            self.get_logger().error(message)
+
+    def _learn(self, call: _Call) -> str:
+        """Learns, writes and publishes; returns what a person wants to know."""
+        request = self._settings.request(dumps(self._learned) if self._learned else "")
+        path = self._settings.output() / _TREE_FILE
+        lesson = self._process.ask(
+            request,
+            cancelled=call.cancelled,
+            limit=self._settings.timeout() or None,
+            progress=lambda progress: self._note(call, progress),
+        )
+        for note in lesson.notes:
+            self.get_logger().warning(f"{note}.")
+        learned = loads(lesson.document)
+        self._hold_back(lesson)
+        with self._lock:
+            if call.cancelled.is_set():
+                raise LearningCancelledError
+            call.progress = _PUBLISHING
+        write_text_atomically(path, lesson.document)
+        self._versions().keep(lesson.document)
+        for name, text in lesson.files.items():
+            write_text_atomically(path.with_name(name), text)
+        self._figures = lesson.figures
+        self._publish(learned, lesson.document)
+        return f"{lesson.sentence} It is published and in {path}.{_in_short(lesson.notes)}"
+
+    def _hold_back(self, lesson: Lesson) -> None:
+        """Refuses a tree that is not to be published.
+
+        Raises:
+            LearningError: It agrees too little with the rows that were held out.
+        """
+        least, agreement = self._settings.least_agreement(), lesson.agreement
+        stays = "it is not published, and the tree before it stays."
+        if least and (agreement is None or agreement < least):
+            told = "with no held-out rows" if agreement is None else f"with {agreement:.1%} of them"
+            raise LearningError(
+                f"{lesson.sentence} It agrees {told}, and min_agreement is {least:.1%}: {stays}"
+            )
+        if lesson.rival is not None and (agreement is None or agreement < lesson.rival):
+            raise LearningError(
+                f"{lesson.sentence} The published tree agrees with {lesson.rival:.1%} of the same "
+                f"held-out rows, and keep_if_better is set: {stays}"
+            )
+
+    def _versions(self) -> TreeVersions:
+        return TreeVersions(self._settings.output() / "trees", self._settings.kept_trees())
+
+    def _rollback(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Publishes the tree before."""
+        with self._lock:
+            if self._call is not None:
+                response.message = f"busy: {self._call}; call again when that is done."
+                return response
+            try:
+                path, document = self._versions().go_back()
+                learned = loads(document)
+                write_text_atomically(self._settings.output() / _TREE_FILE, document)
+            except (RebtError, OSError) as err:
+                response.message = str(err)
+                return response
+            self._figures = {}
+            self._publish(learned, document)
+        response.success = True
+        response.message = f"published the tree before, {path}."
+        self._last = Report(Level.OK, response.message)
+        self.get_logger().info(response.message)
+        return response
+
+    def _note(self, call: _Call, progress: Progress) -> None:
+        entered = progress.stage != call.progress.stage
+        call.progress = progress
+        if entered:
+            self._diagnostics.publish()
+
+    def _cancel(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        with self._lock:
+            call = self._call
+            late = call is not None and call.progress is _PUBLISHING
+            if call is not None and not late:
+                call.cancelled.set()
+        if call is None:
+            response.message = "there is nothing to cancel: nothing is being learned."
+        elif late:
+            response.message = "it is too late to cancel: the tree is being published."
+        else:
+            self._process.cancel()
+            call.over.wait()
+            response.success = True
+            response.message = "learning was cancelled: the tree before it stays."
+        return response
+
+    def _publish_what_is_on_disk(self) -> None:
+        path = self._settings.output() / _TREE_FILE
+        try:
+            learned = find_tree(path)
+        except RebtError as err:
+            self._last = Report(Level.WARN, f"the tree on disk is not published: {err}")
+            self.get_logger().warning(self._last.message)
+            return
+        if learned is None:
+            self.get_logger().info(
+                f"there is no tree in {path.absolute()} yet: call ~/relearn to learn one from "
+                f"{self._settings.demonstrations().absolute()}."
+            )
+            return
+        self._publish(learned, dumps(learned))
+        try:
+            self._versions().keep(dumps(learned))
+        except RebtError as err:
+            self.get_logger().warning(str(err))
+        self._last = Report(Level.OK, f"idle: published the tree in {path}")
+        self.get_logger().info(
+            f"published the tree in {path.absolute()}; ~/relearn learns from "
+            f"{self._settings.demonstrations().absolute()}."
+        )
+
+    def _publish(self, learned: LearnedTree, document: str) -> None:
+        self._learned = learned
+        self._publisher.publish(String(data=document))
+
+    def _report(self) -> Report:
+        values: dict[str, Any] = {"learning process": self._process.id or "none"}
+        if self._learned is not None:
+            provenance = self._learned.provenance
+            values |= {
+                "nodes": nodes.size(self._learned.tree),
+                "actions": len(self._learned.actions),
+                "rows": provenance.rows,
+                "demonstrations": provenance.demonstrations,
+                "own-history agreement": provenance.figures.own_history_agreement,
+                "mean recall of held-out rows": provenance.figures.mean_recall,
+                "history": provenance.history.value,
+            }
+            values |= self._figures
+        call = self._call
+        if call is not None:
+            progress = call.progress
+            values |= {"stage": progress.stage, "progress (%)": round(100 * progress.share)}
+            return Report(Level.OK, str(call), values)
+        values["stage"] = "idle"
+        problems = self._watch.several(
+            ["behavior_tree"], "trees", "executors follow one by chance; stop all but one"
+        )
+        if problems:
+            return Report(Level.WARN, "; ".join((self._last.message, *problems)), values)
+        return Report(self._last.level, self._last.message, values)
+
+
+class _Call:
+    """A call of ``~/relearn`` that is under way."""
+
+    def __init__(self) -> None:
+        self.since = time.monotonic()
+        self.progress = Progress("starting", 0.0)
+        self.cancelled = threading.Event()
+        self.over = threading.Event()
+
+    def __str__(self) -> str:
+        seconds = time.monotonic() - self.since
+        return f"learning since {seconds:.0f} s ({self.progress.stage}, {self.progress.share:.0%})"
+
+
+def _in_short(notes: Sequence[str]) -> str:
+    """The first notes, for an answer."""
+    if not notes:
+        return ""
+    more = len(notes) - _NOTES_ANSWERED
+    rest = f"; and {more} more, see the log" if more > 0 else ""
+    return f" Note: {'; '.join(notes[:_NOTES_ANSWERED])}{rest}."
+
+
+def main(args: list[str] | None = None) -> None:
+    """Runs the learner."""
+    lifetime.run(LearnerNode, args, threads=_THREADS)
+
+
+if __name__ == "__main__":
+    main()

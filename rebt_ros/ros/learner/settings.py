@@ -1,0 +1,267 @@
+"""The learner's parameters.  All can be set at any time: each call reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from rclpy.node import Node
+
+from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.schema import LARGEST_LAG
+from rebt_ros.errors import OptionError
+from rebt_ros.live.learning_process import Request
+from rebt_ros.ros.parameters import Parameters
+
+_USES: Final = ("auto", "always", "never")
+
+
+@dataclass(frozen=True, slots=True)
+class LearnerSettings:
+    """What reads the parameters."""
+
+    demonstrations: Callable[[], Path]
+    output: Callable[[], Path]
+    """Where tree.json is written to."""
+    timeout: Callable[[], float]
+    """How long learning may take, seconds; 0 for no limit."""
+    least_agreement: Callable[[], float]
+    """With held-out rows; trees that agree less are not published."""
+    only_better: Callable[[], bool]
+    """Whether a tree that is worse than the one that is published is not published."""
+    kept_trees: Callable[[], int]
+    """How many of the published trees are kept."""
+    binary: Callable[[], tuple[str, ...]]
+    categorical: Callable[[], tuple[str, ...]]
+    options: Mapping[str, Callable[[], object]]
+    """By the names that they have in `LearnOptions`."""
+
+    def request(self, published: str) -> Request:
+        """What is to be learned from what, and how, as the parameters are now.
+
+        Args:
+            published: The document that is published now.
+
+        Raises:
+            OptionError: A directory makes no sense.
+        """
+        return Request(
+            str(self.demonstrations()),
+            {name: read() for name, read in self.options.items()},
+            self.binary(),
+            self.categorical(),
+            published if self.only_better() else "",
+        )
+
+
+def declare_settings(node: Node) -> LearnerSettings:
+    """Declares the parameters.
+
+    Raises:
+        OptionError: One makes no sense.
+    """
+    declare = Parameters(node)
+    return LearnerSettings(
+        demonstrations=declare.directory(
+            "demonstrations",
+            "demonstrations",
+            "Directory of the recordings to learn from; ~ is your home.",
+            fixed=False,
+        ),
+        output=declare.directory(
+            "output", "learned", "Directory that tree.json is written to.", fixed=False
+        ),
+        timeout=declare.number(
+            "relearn_timeout",
+            0.0,
+            "Learning that takes longer is stopped (seconds); 0.0 for no limit.",
+            0.0,
+            1e6,
+            fixed=False,
+        ),
+        least_agreement=declare.number(
+            "min_agreement",
+            0.0,
+            "Least own-history agreement with held-out rows of a tree that is published.",
+            0.0,
+            1.0,
+            fixed=False,
+        ),
+        only_better=declare.flag(
+            "keep_if_better",
+            False,
+            "Whether the published tree stays where it agrees more with the same held-out rows.",
+            fixed=False,
+        ),
+        kept_trees=declare.integer(
+            "kept_trees",
+            20,
+            "How many of the trees that were published are kept in OUTPUT/trees, for ~/rollback.",
+            2,
+            100_000,
+            fixed=False,
+        ),
+        binary=declare.texts(
+            "binary_features",
+            [],
+            "Features to take for binary; others are if they hold nothing but 0 and 1.",
+            fixed=False,
+        ),
+        categorical=declare.texts(
+            "categorical_features", [], "Features whose numbers are categories.", fixed=False
+        ),
+        options={**_pruning(declare), **_form(declare), **_rows(declare)},
+    )
+
+
+def _pruning(declare: Parameters) -> dict[str, Callable[[], object]]:
+    """How large the tree becomes."""
+    max_depth = declare.integer(
+        "max_depth", 0, "Splits on the longest path; 0 for no limit.", 0, 100, fixed=False
+    )
+    ccp_alpha = declare.number(
+        "ccp_alpha",
+        -1.0,
+        "Complexity parameter of the pruning, 0.0 prunes nothing; -1.0 to choose it by "
+        "cross-validation.",
+        -1.0,
+        1e9,
+        fixed=False,
+    )
+    level = declare.integer(
+        "level",
+        -1,
+        "Number of the pruning level, 0 prunes nothing, instead of ccp_alpha; -1 for none.",
+        -1,
+        1_000_000,
+        fixed=False,
+    )
+    return {
+        "level": lambda: None if (number := level()) < 0 else number,
+        "max_depth": lambda: max_depth() or None,
+        "ccp_alpha": lambda: None if (alpha := ccp_alpha()) < 0 else alpha,
+    }
+
+
+def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
+    """What stands in the tree."""
+    history = declare.text(
+        "history",
+        "auto",
+        "What the tree may test of what was done before: previous (action), last (action taken, as "
+        "in the paper) or none; auto: the previous action where it makes the rows simpler to "
+        "explain.",
+        choices=("auto", *(kind.value for kind in History)),
+        fixed=False,
+    )
+    units = declare.texts(
+        "units",
+        [],
+        "Units of features, such as left=m: features of different units are not compared.",
+        fixed=False,
+    )
+    return {
+        "delta": declare.number(
+            "delta",
+            0.3,
+            "Threshold δ of actions that are close enough to stand in one PSA node.",
+            0.0,
+            1.0,
+            fixed=False,
+        ),
+        "psa": declare.text(
+            "psa",
+            "auto",
+            "Whether PSA nodes stand in the tree; auto: where they raise agreement.",
+            choices=_USES,
+            fixed=False,
+        ),
+        "root": declare.text(
+            "root",
+            "selector",
+            "Root node: selector, smaller, or parallel, as in the paper.",
+            choices=[root.value for root in Root],
+            fixed=False,
+        ),
+        "history": lambda: None if (asked := history()) == "auto" else asked,
+        "differences": declare.text(
+            "differences",
+            "auto",
+            "Whether the tree may compare two features, as in left < right; auto: where that makes "
+            "it a quarter smaller at the same agreement.",
+            choices=_USES,
+            fixed=False,
+        ),
+        "units": lambda: _units(units()),
+        "simplest": declare.flag(
+            "simplest",
+            True,
+            "Whether the simplest of the trees that fit the rows is searched for, up to 30 leaves.",
+            fixed=False,
+        ),
+        "readable_thresholds": declare.flag(
+            "readable_thresholds",
+            True,
+            "Whether thresholds are moved to round values within the gaps between rows.",
+            fixed=False,
+        ),
+    }
+
+
+def _units(texts: Sequence[str]) -> dict[str, str]:
+    """Units by features.
+
+    Raises:
+        OptionError: A text does not name both.
+    """
+    units = {}
+    for text in texts:
+        feature, sign, unit = text.rpartition("=")
+        if not (feature and sign and unit):
+            raise OptionError(f"units has {text!r}, which is not FEATURE=UNIT, such as left=m.")
+        units[feature] = unit
+    return units
+
+
+def _rows(declare: Parameters) -> dict[str, Callable[[], object]]:
+    """What rows it is learned from, and judged on."""
+    reaction_time = declare.number(
+        "reaction_time",
+        -1.0,
+        "How late the demonstrator acted, to be undone before learning (seconds); -1.0 to read it "
+        "off demonstrations that were recorded with a sample rate.",
+        -1.0,
+        5.0,
+        fixed=False,
+    )
+    return {
+        "reaction_time": lambda: None if (late := reaction_time()) < 0 else late,
+        "test_fraction": declare.number(
+            "test_fraction", 0.25, "Share to hold out for judging.", 0.0, 0.9, fixed=False
+        ),
+        "refit": declare.flag(
+            "refit", True, "Whether to learn from all rows once it is judged.", fixed=False
+        ),
+        "lags": declare.integer(
+            "lags",
+            0,
+            "How many rows each feature looks back; record with a sample rate for it.",
+            0,
+            LARGEST_LAG,
+            fixed=False,
+        ),
+        "random_state": declare.integer(
+            "random_state", 0, "Decides between equally good splits.", 0, 2**32 - 1, fixed=False
+        ),
+        "upsample": declare.text(
+            "upsample",
+            "none",
+            "Whether rows are made up for rare actions; svm-smote needs imbalanced-learn.",
+            choices=[upsampling.value for upsampling in Upsampling],
+            fixed=False,
+        ),
+    }

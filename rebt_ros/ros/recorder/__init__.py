@@ -1,0 +1,1 @@
+"""The recorder: topics in, demonstrations out."""

@@ -1,0 +1,419 @@
+"""The recorder: writes what a demonstrator does, and in which state, to durable recordings."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Final
+
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock, ROSClock
+from rclpy.clock_type import ClockType
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+from rclpy.validate_topic_name import validate_topic_name
+from std_msgs.msg import Bool, Float64MultiArray, String
+from std_srvs.srv import SetBool, Trigger
+
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.errors import OptionError
+from rebt_ros.live.arrival import LAST, ArrivalOrder
+from rebt_ros.live.losses import Losses
+from rebt_ros.live.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
+from rebt_ros.live.state_streams import StateStreams
+from rebt_ros.ros import lifetime
+from rebt_ros.ros.arrays import names_of, values_of
+from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
+from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
+from rebt_ros.ros.graph_watch import GraphWatch
+from rebt_ros.ros.recorder.sending_time import SendingTime, received_at
+from rebt_ros.ros.recorder.settings import declare_settings
+from rebt_ros.storage.recording import RecordingWriter
+from rebt_ros.storage.recording_head import Origin
+
+#: Long enough that no message of a burst is lost while the disk is slow.
+_QUEUE: Final = 5000
+
+#: An action that came so long after it was sent may belong to another state (seconds).
+_LATE: Final = 1.0
+
+#: Least time between two fetches (seconds).
+_LEAST_PERIOD: Final = 0.005
+
+#: Time between two looks at who publishes (seconds).
+_LOOK_PERIOD: Final = 0.5
+
+#: A state topic is silent after this long without a message (seconds).
+_SILENT: Final = 2.0
+
+
+class _Fetched(CallbackGroup):
+    """Subscriptions whose messages a timer fetches, and for which no executor wakes up.
+
+    To wake an executor up costs many times what it costs to take a message.
+    """
+
+    def can_execute(self, entity: object) -> bool:
+        """Never."""
+        return False
+
+    def beginning_execution(self, entity: object) -> bool:
+        """Never."""
+        return False
+
+    def ending_execution(self, entity: object) -> None:
+        """Nothing has begun."""
+
+
+class RecorderNode(Node):
+    """Subscribes to states and actions, and writes one recording per demonstration.
+
+    Messages and service calls take effect in the order in which they were sent, or received where
+    the clocks of publishers cannot be compared, whatever the order of their callbacks; so an action
+    is recorded with the state that held then (see `PairBy`).
+
+    Raises:
+        OptionError: A parameter makes no sense.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("recorder")
+        settings = declare_settings(self)
+        self._settings = settings
+        self._faults = Faults(self.get_logger())
+        self._session = RecordingSession(
+            settings.state_topics,
+            settings.action_topics,
+            settings.sample_rate,
+            self._open_writer,
+            lambda kind, text: self._faults.note(kind, text, severe=kind == WRITE_ERROR),
+        )
+        self._check_names(settings.sources)
+        self._order = ArrivalOrder[Callable[[], object]](
+            settings.reorder_window, settings.state_wait
+        )
+        self._streams = StateStreams(
+            (topic.name for topic in settings.state_topics), settings.state_wait
+        )
+        self._received = dict.fromkeys((topic.name for topic in settings.state_topics), 0)
+        self._messages = 0
+        self._lost = 0
+        self._losses = Losses(settings.sources)
+        self._reliable = settings.action_topics if settings.best_effort else settings.sources
+        self._heard: dict[str, float] = {}
+        self._reported = time.monotonic()
+        self._immediate = settings.reorder_window == 0
+        self._sources: list[Subscription] = []
+        self._listen_to_demonstrator()
+        self._listen_to_executor()
+        topics = [source.topic_name for source in self._sources]
+        self._sending = SendingTime(self, topics, settings.pair_by)
+        self._watch = GraphWatch(self)
+        self._ready = self.create_publisher(Bool, "~/ready", DRIVING_QOS)
+        self._said_ready: bool | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        """Opens everything else that calls back."""
+        # Of their own, because their answers wait for the messages received before.
+        group = MutuallyExclusiveCallbackGroup()
+        for name, kind, command in (
+            ("~/record", SetBool, self._record),
+            ("~/new_demonstration", Trigger, self._renew),
+            ("~/discard_demonstration", Trigger, lambda _, stamp: self._session.discard(stamp)),
+            ("~/failed", Trigger, lambda _, stamp: self._session.fail(stamp)),
+        ):
+            self.create_service(kind, name, partial(self._serve, command), callback_group=group)
+        settings = self._settings
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        if not self._immediate:
+            period = max(settings.reorder_window / 2e9, _LEAST_PERIOD)
+            self.create_timer(period, self._take_ready, clock=steady)
+        self.create_timer(_LOOK_PERIOD, self._look_at_publishers, clock=steady)
+        if settings.sync_period:
+            self.create_timer(
+                settings.sync_period,
+                lambda: self._session.sync(self._stamp(time.time_ns())),
+                clock=steady,
+            )
+        self._diagnostics = Diagnostics(self, "recording", self._report)
+        if settings.recording:
+            self._session.start(self._stamp(time.time_ns()))
+        self.get_logger().info(
+            f"{'recording' if settings.recording else 'ready to record'} "
+            f"{', '.join(settings.action_topics)} with "
+            f"{', '.join(topic.name for topic in settings.state_topics)} "
+            f"to {settings.demonstrations.resolve()}."
+        )
+
+    def close(self) -> None:
+        """Writes what has been received, and ends the recording."""
+        self._take_waiting_messages()
+        for take in self._order.flush(self._complete(time.monotonic_ns())):
+            take()
+        # A signal has shut the context down, and the node's own logger publishes what it says.
+        logger = self.get_logger() if self.context.ok() else get_logger("rebt_ros")
+        if self._order.held:
+            logger.warning(
+                f"{self._order.held} actions are left out: the states that they belong to had not "
+                "come when the recorder was stopped."
+            )
+        if self._session.recording:
+            answer = self._session.stop(self._stamp(time.time_ns()))
+            log = logger.info if answer.success else logger.error
+            log(answer.message)
+
+    def _open_writer(self, features: tuple[Feature, ...], origin: Origin) -> Writer:
+        settings = self._settings
+        writer = RecordingWriter(
+            settings.demonstrations,
+            features,
+            settings.action_topics,
+            sample_rate=settings.sample_rate,
+            origin=origin,
+        )
+        self.get_logger().info(f"recording to {writer.path}.")
+        return writer
+
+    def _listen_to_demonstrator(self) -> None:
+        waking = None if self._immediate else _Fetched()
+        states, actions = QoSProfile(depth=_QUEUE), QoSProfile(depth=_QUEUE)
+        if self._settings.best_effort:
+            states.reliability = ReliabilityPolicy.BEST_EFFORT
+        for topic in self._settings.state_topics:
+            take = partial(self._on_state, topic.name)
+            self._sources.append(
+                self.create_subscription(
+                    Float64MultiArray, topic.name, take, states, callback_group=waking
+                )
+            )
+        for channel in self._settings.action_topics:
+            take = partial(self._on_action, channel)
+            self._sources.append(
+                self.create_subscription(String, channel, take, actions, callback_group=waking)
+            )
+
+    def _listen_to_executor(self) -> None:
+        """Subscribes to what tells demonstrations and corrections apart."""
+        commands, driving = self._settings.executor.commands, self._settings.executor.driving
+        channels = self._settings.action_topics
+        shown = {self.resolve_topic_name(channel) for channel in channels}
+        for channel in channels if commands else ():
+            topic = topic_of(commands, channel, channels)
+            # A robot that was told to learn from itself is not corrected by itself.
+            if self.resolve_topic_name(topic) not in shown:
+                take = partial(self._on_command, channel)
+                self._sources.append(
+                    self.create_subscription(String, topic, take, QoSProfile(depth=_QUEUE))
+                )
+        if driving:
+            self._sources.append(
+                self.create_subscription(Bool, driving, partial(self._on_driving), DRIVING_QOS)
+            )
+
+    def _on_command(self, channel: str, message: String, info: dict[str, Any]) -> None:
+        place = self._place(info)
+        stamp = self._stamp(place)
+        self._queue(place, partial(self._session.command, stamp, channel, message.data))
+
+    def _on_driving(self, message: Bool, info: dict[str, Any]) -> None:
+        place = self._place(info)
+        self._queue(place, partial(self._session.drive, self._stamp(place), message.data))
+
+    def _check_names(self, topics: Sequence[str]) -> None:
+        for topic in topics:
+            validate_topic_name(topic)
+        resolved = [self.resolve_topic_name(topic) for topic in topics]
+        for topic, name in zip(topics, resolved, strict=True):
+            if resolved.count(name) > 1:
+                raise OptionError(
+                    f"topic {topic!r} is {name}, which state_topics and action_topics name twice."
+                )
+
+    def _on_state(self, topic: str, message: Float64MultiArray, info: dict[str, Any]) -> None:
+        self._received[topic] += 1
+        self._heard[topic] = time.monotonic()
+        self._note(topic, info)
+        sent = self._sending.of(info)
+        if sent is not None:
+            self._streams.take(topic, sent, time.monotonic_ns())
+        place = received_at(info) if sent is None else sent
+        values, labels = values_of(message), names_of(message)
+        stamp = self._stamp(place)
+        self._queue(place, partial(self._session.observe, stamp, topic, values, labels, sent))
+
+    def _on_action(self, topic: str, message: String, info: dict[str, Any]) -> None:
+        self._note(topic, info)
+        sent = self._sending.of(info)
+        received = received_at(info)
+        late = (received - (info.get("source_timestamp") or received)) / 1e9
+        if sent is None and late > _LATE:
+            self._faults.note(
+                "late action",
+                f"an action on {topic!r} came {late:.1f} s after it was sent and has the state of "
+                "its arrival: wait until recorder and publisher know each other, and check that "
+                "their clocks agree.",
+            )
+        place = received if sent is None else sent
+        take = partial(self._session.act, self._stamp(place), topic, message.data, sent)
+        self._queue(place, take, waits=sent is not None)
+
+    def _note(self, topic: str, info: dict[str, Any]) -> None:
+        """Counts a message."""
+        self._messages += 1
+        self._losses.take(topic, info.get("publication_sequence_number"))
+
+    def _place(self, info: dict[str, Any]) -> int:
+        """Where a message belongs among the others, nanoseconds."""
+        sent = self._sending.of(info)
+        return received_at(info) if sent is None else sent
+
+    def _look_at_publishers(self) -> None:
+        ready = not self._unheard()
+        if ready is not self._said_ready:
+            self._said_ready = ready
+            self._ready.publish(Bool(data=ready))
+        silent = self._sending.look()
+        for topic in self._settings.state_topics:
+            if self.resolve_topic_name(topic.name) in silent:
+                self._streams.end(topic.name)
+
+    def _unheard(self) -> list[str]:
+        """Topics that would be missing in a demonstration that began now."""
+        demonstrators = self._sources[: len(self._settings.sources)]
+        states = {topic.name for topic in self._settings.state_topics}
+        return [
+            name
+            for name, source in zip(self._settings.sources, demonstrators, strict=True)
+            if (name not in self._heard if name in states else not source.get_publisher_count())
+        ]
+
+    def _problems(self) -> list[str]:
+        """What in the graph keeps this node from recording."""
+        demonstrators = self._sources[: len(self._settings.sources)]
+        return [*self._watch.timeless(), *self._watch.unheard(demonstrators)]
+
+    async def _serve(
+        self, command: Callable[[Any, int], Answer], request: Any, response: Any
+    ) -> Any:
+        done = Future()
+        now = time.time_ns()
+        stamp = self._stamp(now)
+        self._queue(now, lambda: done.set_result(command(request, stamp)))
+        answer = await done
+        self.get_logger().info(answer.message)
+        response.success, response.message = answer
+        return response
+
+    def _record(self, request: SetBool.Request, stamp: int) -> Answer:
+        if not request.data:
+            return self._session.stop(stamp)
+        return self._with_what_is_missing(self._session.start(stamp))
+
+    def _renew(self, _: Trigger.Request, stamp: int) -> Answer:
+        return self._with_what_is_missing(self._session.renew(stamp))
+
+    def _with_what_is_missing(self, answer: Answer) -> Answer:
+        unheard = self._unheard()
+        if not self._session.recording or not unheard:
+            return answer
+        return answer._replace(
+            message=f"{answer.message} Not heard so far: {', '.join(unheard)}; wait for ~/ready."
+        )
+
+    def _queue(self, place: int, take: Callable[[], object], *, waits: bool = False) -> None:
+        self._order.push(place, take, time.monotonic_ns(), waits=waits)
+        if self._immediate:
+            self._take_ready()
+
+    def _take_ready(self) -> None:
+        now = time.monotonic_ns()
+        if not self._immediate:
+            self._take_waiting_messages()
+        for take in self._order.ready(now, self._complete(now)):
+            take()
+
+    def _complete(self, now: int) -> int:
+        """All states that were sent up to then have come, as far as that matters."""
+        return self._streams.complete(now) if self._sending.comparable else LAST
+
+    def _take_waiting_messages(self) -> None:
+        """Fetches what was received and still waits for its callback.
+
+        On a busy machine the executor may come back late, with this timer first and with many
+        messages waiting; however long they wait, their order must not depend on it.
+        """
+        for source in self._sources:
+            with source.handle:
+                for _ in range(_QUEUE):
+                    taken = source.handle.take_message(source.msg_type, source.raw)
+                    if taken is None:
+                        break
+                    source.callback(*taken)
+
+    def _stamp(self, place: int) -> int:
+        """What a row says: its action's place, or simulated time where that is in use."""
+        clock = self.get_clock()
+        simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
+        return int(clock.now().nanoseconds) if simulated else place
+
+    def _count_losses(self) -> None:
+        for topic, count in self._losses.settle(self.count_publishers).items():
+            self._lost += count
+            if count and topic in self._reliable:
+                self._faults.note(
+                    "message lost",
+                    f"{count} messages on {topic!r} were lost within a second: publish less often, "
+                    "or with a deeper history.",
+                )
+
+    def _report(self) -> Report:
+        now = time.monotonic()
+        elapsed, self._reported = now - self._reported, now
+        session = self._session
+        self._count_losses()
+        values: dict[str, object] = {
+            "rows": session.rows,
+            "rows lost": session.lost,
+            "takeovers": session.takeovers,
+            "failed episodes": session.failed,
+            "messages": self._messages,
+            "messages lost": self._lost,
+            "actions that wait for their state": self._order.held,
+            "paired by": "sent" if self._sending.comparable else "received",
+            "demonstration": session.writer.path if session.writer else "none yet",
+            "rows of the demonstration": session.writer.rows if session.writer else 0,
+            "origin of the demonstration": session.origin.value,
+        }
+        for topic, count in self._received.items():
+            values[f"rate of {topic} (Hz)"] = f"{count / elapsed:.1f}" if elapsed else "unknown"
+            self._received[topic] = 0
+        values |= self._faults.counts
+        silent = [topic for topic in self._received if now - self._heard.get(topic, 0.0) > _SILENT]
+        if session.failure:
+            return Report(Level.ERROR, session.failure, values)
+        if not session.recording:
+            return Report(Level.OK, "not recording", values)
+        if self._faults.recent:
+            return Report(Level.WARN, self._faults.recent, values)
+        problems = self._problems()
+        if problems:
+            return Report(Level.WARN, "; ".join(problems), values)
+        if silent:
+            return Report(Level.WARN, f"no messages on {', '.join(silent)}", values)
+        if session.awaited:
+            return Report(Level.OK, "waiting for a person to show what failed", values)
+        return Report(Level.OK, "recording", values)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Runs the recorder."""
+    lifetime.run(RecorderNode, args)
+
+
+if __name__ == "__main__":
+    main()

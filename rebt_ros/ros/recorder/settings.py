@@ -1,0 +1,165 @@
+"""The recorder's parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rclpy.node import Node
+
+from rebt_ros.demonstration.builder import StateTopic
+from rebt_ros.errors import OptionError
+from rebt_ros.ros.parameters import Parameters, nanoseconds
+from rebt_ros.ros.recorder.sending_time import PairBy
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutorTopics:
+    """Where the recorder hears what the executor does; empty for nowhere."""
+
+    commands: str
+    driving: str
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderSettings:
+    """What the recorder was started with; durations in nanoseconds."""
+
+    state_topics: tuple[StateTopic, ...]
+    action_topics: tuple[str, ...]
+    executor: ExecutorTopics
+    demonstrations: Path
+    """Directory of the recordings."""
+    sample_rate: float | None
+    """Rows per second while an action holds; None for a row per action message."""
+    recording: bool
+    """Whether to record from the start."""
+    best_effort: bool
+    """Whether states are subscribed to as sensor data are."""
+    reorder_window: int
+    """How long messages wait for others that belong before them."""
+    pair_by: PairBy
+    state_wait: int
+    """How long an action waits at most for states that were sent before it."""
+    sync_period: float
+    """Seconds; 0.0 for only when a demonstration ends."""
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """State topics, then action topics."""
+        return (*(topic.name for topic in self.state_topics), *self.action_topics)
+
+
+def declare_settings(node: Node) -> RecorderSettings:
+    """Declares and reads the parameters.
+
+    Raises:
+        OptionError: One makes no sense.
+    """
+    declare = Parameters(node)
+    names = declare.texts(
+        "state_topics", ["state"], "Float64MultiArray topics, in the order of their features."
+    )()
+    fields = declare.texts(
+        "state_fields",
+        [],
+        "Names of the values of state topics, each entry as in 'state:front,left,right'; "
+        "where a topic has none, its messages' layout labels name them, else their index.",
+    )()
+    sample_rate = declare.number(
+        "sample_rate",
+        0.0,
+        "Rows per second while an action holds; 0.0 for one row per action message.",
+        0.0,
+        1000.0,
+    )()
+    reliability = declare.text(
+        "state_qos",
+        "reliable",
+        "How to subscribe to states: sensor_data also hears best-effort publishers.",
+        choices=("reliable", "sensor_data"),
+    )()
+    window = declare.number(
+        "reorder_window",
+        0.05,
+        "How long to wait for messages that belong before others (seconds).",
+        0.0,
+        1.0,
+    )()
+    state_wait = declare.number(
+        "state_wait",
+        5.0,
+        "How long an action waits at most for states that were sent before it, where states have "
+        "just stopped to come (seconds).",
+        0.0,
+        60.0,
+    )()
+    pair_by = declare.text(
+        "pair_by",
+        PairBy.AUTO.value,
+        "What says which state an action belongs to: when they were sent, when they were "
+        "received, or auto, for when they were sent if all publishers are on this machine.",
+        choices=[one.value for one in PairBy],
+    )()
+    return RecorderSettings(
+        state_topics=_state_topics(names, fields),
+        action_topics=declare.texts(
+            "action_topics", ["action"], "String topics; each is a channel of its own."
+        )(),
+        executor=_executor_topics(declare),
+        demonstrations=declare.directory(
+            "demonstrations", "demonstrations", "Directory of the recordings; ~ is your home."
+        )(),
+        sample_rate=sample_rate or None,
+        recording=declare.flag("recording", True, "Whether to record from the start.")(),
+        best_effort=reliability == "sensor_data",
+        reorder_window=nanoseconds(window),
+        # A grid of samples, and taking messages as they come, know of the present only.
+        pair_by=PairBy.RECEIVED if sample_rate or not window else PairBy(pair_by),
+        state_wait=nanoseconds(state_wait),
+        sync_period=declare.number(
+            "sync_period",
+            0.0,
+            "How often rows are made to survive a loss of power (seconds); 0.0 for only when a "
+            "demonstration ends.",
+            0.0,
+            3600.0,
+        )(),
+    )
+
+
+def _executor_topics(declare: Parameters) -> ExecutorTopics:
+    return ExecutorTopics(
+        commands=declare.text(
+            "command_topic",
+            "command",
+            "String topic of the executor's commands, as a correction knows what they did before "
+            "it (with several action_topics: a topic below it for each); empty for none.",
+        )(),
+        driving=declare.text(
+            "driving_topic",
+            "executor/driving",
+            "Bool topic on which the executor says whether it drives: what a person does while it "
+            "drives is a demonstration of its own; empty for none.",
+        )(),
+    )
+
+
+def _state_topics(names: Sequence[str], fields: Sequence[str]) -> tuple[StateTopic, ...]:
+    """The state topics, with their fields where an entry "topic:field,field" gives them."""
+    named: dict[str, tuple[str, ...]] = {}
+    for entry in fields:
+        topic, colon, listed = entry.partition(":")
+        parts = tuple(one.strip() for one in listed.split(","))
+        if not colon or not all(parts):
+            raise OptionError(
+                f"parameter 'state_fields' has {entry!r}: write it as 'topic:field,field'."
+            )
+        if topic not in names or topic in named:
+            raise OptionError(
+                f"parameter 'state_fields' names {topic!r}, which state_topics "
+                f"{'does not name' if topic not in names else 'has fields for already'}."
+            )
+        named[topic] = parts
+    return tuple(StateTopic(name, named.get(name, ())) for name in names)

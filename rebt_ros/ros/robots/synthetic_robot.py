@@ -1,0 +1,174 @@
+"""A robot that acts as a configuration of the paper's experiments says, in a random environment."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Bool, Float64MultiArray, MultiArrayDimension, String
+from std_srvs.srv import SetBool
+
+from rebt_ros.demonstration.fields import dimension_labels_of
+from rebt_ros.errors import OptionError
+from rebt_ros.ros import lifetime
+from rebt_ros.ros.parameters import Parameters, at_home
+from rebt_ros.storage.text import read_text
+from rebt_ros.study.simulator.configuration import parse_config
+from rebt_ros.study.simulator.synthetic_robot import (
+    REPEATS,
+    RUNNING_CHANCE,
+    ExperimentRobot,
+    published_variables,
+)
+
+_LARGEST: Final = 2**31 - 1
+
+#: Messages that are kept for a subscriber that is late; a tick can do many actions.
+_QUEUE: Final = 1000
+
+#: How long to wait until subscribers have heard that acting begins (seconds).
+_GREETING: Final = 1.0
+
+
+class SyntheticRobotNode(Node):
+    """Senses and acts by chance, and publishes both, as a robot and its demonstrator would.
+
+    At every tick it publishes its state, and then each action that is done, with how it ended.
+    An empty action says that none is taken: it is sent before the first tick and after the last.
+
+    Raises:
+        RebtError: A parameter makes no sense, or the configuration cannot be read.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("synthetic_robot")
+        declare = Parameters(self)
+        path = declare.text("config", "", "Configuration file of an experiment; ~ is your home.")()
+        seed = declare.integer("seed", 0, "Equal numbers give equal robots.", -_LARGEST, _LARGEST)()
+        rate = declare.number("rate", 10.0, "Ticks of the tree per second.", 0.1, 1000.0)()
+        self._ticks = declare.integer(
+            "ticks", 0, "Ticks until the robot stops for good; 0 for no end.", 0, _LARGEST
+        )()
+        running_chance = declare.number(
+            "running_chance",
+            RUNNING_CHANCE,
+            "How often an action that is tried is not done yet; below 1.",
+            0.0,
+            1.0,
+        )()
+        repeats = declare.integer(
+            "repeats", REPEATS, "How often Repeaters run their children.", 1, _LARGEST
+        )()
+        self._enabled = declare.flag("enabled", True, "Whether to act from the start.")()
+        self._audience = declare.integer(
+            "wait_for_subscribers",
+            0,
+            "Subscribers that state and action must have each before the robot begins to act.",
+            0,
+            1000,
+        )()
+        if not path:
+            raise OptionError("parameter 'config' is empty: give it a configuration file.")
+
+        file = at_home("config", path)
+        config = parse_config(read_text(file), file.stem)
+        for note in config.notes:
+            self.get_logger().warning(f"{note}.")
+        self._robot = ExperimentRobot(
+            config,
+            seed,
+            running_chance=running_chance,
+            repeats=repeats,
+            variables=published_variables(config),
+        )
+        self._ticked = 0
+        self._done = 0
+        self._begun = False
+
+        self._layout = Float64MultiArray().layout
+        labels = dimension_labels_of(self._robot.variables)
+        size = len(self._robot.variables) if len(labels) == 1 else 1
+        self._layout.dim = [
+            MultiArrayDimension(label=label, size=size, stride=size) for label in labels
+        ]
+        qos = QoSProfile(depth=_QUEUE)
+        self._states = self.create_publisher(Float64MultiArray, "state", qos)
+        self._actions = self.create_publisher(String, "action", qos)
+        self._outcomes = self.create_publisher(Bool, "outcome", qos)
+        self.create_service(SetBool, "~/enable", self._on_enable)
+        self.create_timer(1.0 / rate, self._on_tick)
+        self.get_logger().info(f"{config.name}: {self._what_it_does()}")
+
+    def _on_tick(self) -> None:
+        if not self._enabled or (not self._begun and not self._begin()):
+            return
+        done = self._robot.step()
+        self._ticked += 1
+        self._done += len(done)
+        self._publish_state()
+        for action in done:
+            self._actions.publish(String(data=action.label))
+            self._outcomes.publish(Bool(data=action.succeeded))
+        if self._over:
+            self._end()
+            self.get_logger().info(self._what_it_does())
+
+    @property
+    def _over(self) -> bool:
+        return self._ticks > 0 and self._ticked >= self._ticks
+
+    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        if not request.data:
+            self._end()
+        elif not self._over:
+            self._enabled = True
+        response.success = self._enabled == request.data
+        response.message = self._what_it_does()
+        return response
+
+    def _begin(self) -> bool:
+        """Makes sure that all who listen already hear states and actions in their order.
+
+        A subscriber that this node knows may not know this node yet: what is sent until then it
+        gets late, and that on one topic after what is sent later on another.
+
+        Returns:
+            Whether there are enough subscribers to begin.
+        """
+        topics = (self._states, self._actions)
+        if any(one.get_subscription_count() < self._audience for one in topics):
+            return False
+        self._publish_state()
+        self._actions.publish(String())
+        for publisher in topics:
+            publisher.wait_for_all_acked(Duration(seconds=_GREETING))
+        self._begun = True
+        return True
+
+    def _end(self) -> None:
+        if self._begun:
+            self._actions.publish(String())
+        self._enabled = self._begun = False
+
+    def _publish_state(self) -> None:
+        self._states.publish(Float64MultiArray(layout=self._layout, data=self._robot.state))
+
+    def _what_it_does(self) -> str:
+        if self._over:
+            return f"at the end after {self._ticked} ticks and {self._done} actions."
+        so_far = f"{self._ticked} ticks and {self._done} actions so far."
+        if not self._enabled:
+            return f"not acting, {so_far}"
+        waiting = f" once it has {self._audience} subscribers" if self._audience else ""
+        return f"acting{'' if self._begun else waiting}, {so_far}"
+
+
+def main(args: list[str] | None = None) -> None:
+    """Runs the synthetic robot."""
+    lifetime.run(SyntheticRobotNode, args)
+
+
+if __name__ == "__main__":
+    main()

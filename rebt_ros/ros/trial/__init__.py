@@ -1,0 +1,1 @@
+"""Trials: an executor that drives with each candidate, and a world that judges."""

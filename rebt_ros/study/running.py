@@ -1,0 +1,193 @@
+"""Running one configuration: simulate, learn all pruning levels, compare."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from random import Random
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.beyond_the_paper.routines.finding import FoundRoutine
+from rebt_ros.decision_tree.encoding import Vocabulary
+from rebt_ros.decision_tree.training import TrainedTree, fit
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.errors import InputError, RebtError
+from rebt_ros.learning.options import DEFAULTS
+from rebt_ros.learning.suggesting import demonstrated_in, routines_of
+from rebt_ros.paper.lat_trees import Demonstrated
+from rebt_ros.study.agreement import held_out_agreements
+from rebt_ros.study.configurations import Lost, digest
+from rebt_ros.study.edit_distance.labelled_tree import labelled
+from rebt_ros.study.edit_distance.networkx_measure import NetworkxMeasure
+from rebt_ros.study.modes import Mode, main_tree, offer, plain_tree
+from rebt_ros.study.provenance import fingerprint
+from rebt_ros.study.reduction import Size, SizeComparison
+from rebt_ros.study.results import (
+    ConfigurationResult,
+    LevelSizes,
+    ModeResult,
+    NetworkxPair,
+    Pairs,
+    SubtreeResult,
+)
+from rebt_ros.study.scores import ComparedTree, Distances, comparable, score
+from rebt_ros.study.settings import MAX_DEPTH, Settings
+from rebt_ros.study.simulator.configuration import ExperimentConfig, as_behavior_tree
+from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, published_variables, simulate
+from rebt_ros.study.words import one_line
+
+
+@dataclass(frozen=True, slots=True)
+class _Level:
+    """What a mode makes at one pruning level."""
+
+    generated: tuple[ComparedTree, ...]
+    offered: LevelSizes
+    sizes: SizeComparison | None
+    """None where the decision tree decides nothing."""
+
+
+def attempt(config: ExperimentConfig, settings: Settings) -> ConfigurationResult | Lost:
+    """Runs a configuration; whatever goes wrong is the reason why it is lost."""
+    try:
+        return run_configuration(config, settings)
+    except RebtError as error:
+        return Lost(config.name, str(error))
+    except Exception as error:
+        # One configuration must not stop the others, which can take an hour.
+        return Lost(config.name, f"{type(error).__name__}: {error}")
+
+
+def run_configuration(config: ExperimentConfig, settings: Settings) -> ConfigurationResult:
+    """Runs a configuration.
+
+    Raises:
+        InputError: No action was done.
+    """
+    start = time.monotonic()
+    robot = ExperimentRobot(config, settings.seed, variables=published_variables(config))
+    demonstration = simulate(robot, settings.ticks).demonstration
+    if not len(demonstration):
+        raise InputError(f"{config.name} did nothing in {settings.ticks} ticks: simulate more.")
+    (table,) = tabulate([demonstration])
+    levels = _levels(table)
+    distances = Distances()
+    subtrees = tuple(
+        _subtree(number, as_behavior_tree(one), table, levels, distances)
+        for number, one in enumerate(config.subtrees, start=1)
+    )
+    pairs = Pairs(distances.compared, distances.excluded, distances.measured)
+    agreements = held_out_agreements(table)
+    return ConfigurationResult(
+        configuration=config.name,
+        digest=digest(config),
+        fingerprint=fingerprint(settings),
+        rows=len(table),
+        levels=len(levels[Mode.BASELINE]),
+        skipped=len(config.notes),
+        subtrees=subtrees,
+        modes={
+            mode: ModeResult(
+                tuple(level.offered for level in made),
+                tuple(level.sizes for level in made if level.sizes is not None),
+                agreements.get(mode),
+            )
+            for mode, made in levels.items()
+        },
+        pairs=pairs,
+        networkx=_networkx_pairs(config, levels, distances, settings),
+        seconds=round(time.monotonic() - start, 2),
+    )
+
+
+def _levels(table: DemonstrationTable) -> dict[Mode, list[_Level]]:
+    """All pruning levels of all modes; none where one action is all that was done."""
+    made: dict[Mode, list[_Level]] = {mode: [] for mode in Mode}
+    if len(table.actions) < 2:
+        return made
+    fitted = fit(table, vocabulary=Vocabulary(History.LAST), max_depth=MAX_DEPTH)
+    routines = routines_of(table, DEFAULTS)
+    demonstrated = demonstrated_in(table)
+    for ccp_alpha in fitted.path.alphas.tolist():
+        trained = fitted.at(ccp_alpha)
+        baseline = Size.of(main_tree(Mode.BASELINE, trained))
+        for mode, levels in made.items():
+            levels.append(_level(mode, table, trained, ccp_alpha, baseline, routines, demonstrated))
+    return made
+
+
+def _level(
+    mode: Mode,
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    ccp_alpha: float,
+    baseline: Size,
+    routines: Sequence[FoundRoutine],
+    demonstrated: Demonstrated,
+) -> _Level:
+    main = main_tree(mode, trained)
+    offered = offer(mode, table, trained, main, ccp_alpha, routines, demonstrated)
+    # Of trees whose leaves all choose one action, BT-Espresso makes a single node as well.
+    decides = len({leaf.most_probable for _, leaf in trained.tree.paths()}) > 1
+    sizes = (
+        SizeComparison(baseline, Size.of(plain_tree(mode, trained.tree, main))) if decides else None
+    )
+    return _Level(
+        comparable(offered.subtrees),
+        LevelSizes(len(offered.subtrees), offered.suggestions),
+        sizes,
+    )
+
+
+def _subtree(
+    number: int,
+    simulated: nodes.Node,
+    table: DemonstrationTable,
+    levels: Mapping[Mode, Sequence[_Level]],
+    distances: Distances,
+) -> SubtreeResult:
+    tree = labelled(simulated)
+    done = any(action.label in table.actions for action in nodes.actions(simulated))
+    if tree is None or not done or not levels[Mode.BASELINE]:
+        return SubtreeResult(number, one_line(simulated), len(tree or ()), 0, 0, {})
+    compared = ComparedTree(tree, simulated)
+    return SubtreeResult(
+        number,
+        one_line(simulated),
+        len(tree),
+        compared.repeaters,
+        compared.psa,
+        {
+            mode: score(tree, [level.generated for level in made], distances)
+            for mode, made in levels.items()
+        },
+    )
+
+
+def _networkx_pairs(
+    config: ExperimentConfig,
+    levels: Mapping[Mode, Sequence[_Level]],
+    distances: Distances,
+    settings: Settings,
+) -> tuple[NetworkxPair, ...]:
+    """The paper's measure on a sample of the configuration's different pairs."""
+    if not settings.networkx_pairs:
+        return ()
+    generated = dict.fromkeys(
+        one.tree for made in levels.values() for level in made for one in level.generated
+    )
+    simulated = [labelled(as_behavior_tree(one)) for one in config.subtrees]
+    pairs = [(one, other) for one in simulated if one is not None for other in generated]
+    drawn = Random(f"{settings.seed} {config.name} networkx").sample(
+        pairs, min(settings.networkx_pairs, len(pairs))
+    )
+    found = []
+    with NetworkxMeasure() as measure:
+        for one, other in drawn:
+            bounds = distances.between(one, other)
+            distance = measure.distance(one, other, settings.pair_seconds)
+            sizes = (len(one), len(other))
+            found.append(NetworkxPair(sizes, bounds.lower, bounds.upper, distance))
+    return tuple(found)

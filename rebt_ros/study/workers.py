@@ -1,0 +1,145 @@
+"""Runs configurations side by side: on the processors of this machine, or on a Dask cluster.
+
+joblib does it in both cases.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import os
+import re
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
+from concurrent.futures.process import BrokenProcessPool
+
+import joblib
+
+from rebt_ros.errors import OptionError, RebtError
+from rebt_ros.study.configurations import Lost
+from rebt_ros.study.results import ConfigurationResult
+from rebt_ros.study.running import attempt
+from rebt_ros.study.settings import Settings
+from rebt_ros.study.simulator.configuration import ExperimentConfig
+
+#: Until a scheduler must have answered (seconds).
+_PATIENCE = 10.0
+_ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:[0-9]{1,5}")
+_SUCH_AS = "name one such as tcp://127.0.0.1:8786"
+#: How often a worker looks whether its parent is there.
+_WATCH_SECONDS = 0.5
+#: joblib 1.3 returns results in order only, so that those behind a slow configuration wait for it.
+_IN_ORDER = joblib.__version__.startswith("1.3.")
+
+
+class WorkerError(RebtError):
+    """A worker, or the cluster, does not work."""
+
+
+def run_all(
+    configs: Sequence[ExperimentConfig],
+    settings: Settings,
+    jobs: int = -1,
+    scheduler: str | None = None,
+) -> Iterator[ConfigurationResult | Lost]:
+    """Runs configurations.
+
+    Args:
+        configs: What to run.
+        settings: How.
+        jobs: Processes; -1 for one per processor.  Not for a cluster, of which all workers work.
+        scheduler: Address of a Dask scheduler; None for this machine.
+
+    Yields:
+        What came out, as soon as it is known and so in any order.
+
+    Raises:
+        OptionError: A number of jobs or an address that makes no sense.
+        WorkerError: A worker died, or the cluster cannot be used.
+    """
+    if jobs == 0:
+        raise OptionError("jobs is 0: name a number of processes, or -1 for one per processor.")
+    if scheduler is not None and not _ADDRESS.fullmatch(scheduler):
+        raise OptionError(f"the scheduler {scheduler!r} is no address: {_SUCH_AS}.")
+    if not configs:
+        return
+    here = os.getpid() if scheduler is None else None
+    tasks = (joblib.delayed(_attempt)(config, settings, here) for config in configs)
+    with _cluster(scheduler) if scheduler is not None else contextlib.nullcontext():
+        # One at a time, so that each is written as soon as it is finished.
+        parallel = joblib.Parallel(
+            n_jobs=-1 if scheduler is not None else min(jobs, len(configs)),
+            batch_size=1,
+            return_as="generator" if _IN_ORDER else "generator_unordered",
+        )
+        try:
+            yield from parallel(tasks)
+        except BrokenProcessPool as err:
+            raise WorkerError(
+                "a worker process died, perhaps of a lack of memory: start the same command again "
+                "with fewer --jobs, and it goes on where it was."
+            ) from err
+
+
+def _attempt(
+    config: ExperimentConfig, settings: Settings, parent: int | None
+) -> ConfigurationResult | Lost:
+    """Runs a configuration, in the process `parent` or in one that is to end with it, if any."""
+    if parent not in (None, os.getpid()):
+        _end_with(parent)
+    return attempt(config, settings)
+
+
+@functools.cache
+def _end_with(parent: int | None) -> None:
+    """Ends this process when its parent ends.
+
+    joblib's processes would finish what was handed to them first when their parent is killed, and
+    be in the way of the run that goes on where it was.
+    """
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH_SECONDS)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextlib.contextmanager
+def _cluster(address: str) -> Iterator[None]:
+    """Lets joblib use a Dask cluster.
+
+    Raises:
+        WorkerError: There is no such cluster, it has no workers, or Dask is not installed.
+    """
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError as err:
+        raise WorkerError(
+            "a Dask cluster is used through the package distributed, which is not installed: "
+            "python3 -m pip install distributed."
+        ) from err
+    if _IN_ORDER:
+        raise WorkerError(
+            f"joblib {joblib.__version__} cannot return results from Dask one by one: install "
+            "joblib 1.4 or newer."
+        )
+    try:
+        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as err:
+        raise WorkerError(f"no Dask scheduler answers at {address} ({err}): {_SUCH_AS}.") from err
+    with client:
+        if not client.scheduler_info()["workers"]:
+            raise WorkerError(f"the Dask scheduler at {address} has no workers: start some.")
+        try:
+            with joblib.parallel_config(backend="dask", client=client):
+                yield
+        except (CancelledError, ImportError, KilledWorker, OSError) as err:
+            raise WorkerError(
+                f"the cluster at {address} failed ({type(err).__name__}: {err}): see that its "
+                "workers can import rebt_ros, and start the same command again; it goes on where "
+                "it was."
+            ) from err
