@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import strategies as some
+from algorithm_1 import algorithm_1
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -23,7 +24,6 @@ from rebt_ros.learning.choice import choose, convert, own_history_choices
 from rebt_ros.learning.cross_validation import CrossValidation, JudgedLevels, folds
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.logic.conditions import Difference
-from rebt_ros.paper.re_bt_espresso import re_bt_espresso
 
 
 def table(
@@ -271,7 +271,7 @@ def by_hand(rows: DemonstrationTable, vocabulary: Vocabulary) -> list[float]:
     for fold in np.unique(number):
         trained = train(rows.where(number != fold), vocabulary=vocabulary)
         own = rows.where(number == fold)
-        chosen = evaluation.own_history_choices(re_bt_espresso(trained.tree, delta=None), own)
+        chosen = evaluation.own_history_choices(algorithm_1(trained.tree, delta=None), own)
         hits = np.bincount(own.chosen[chosen == own.chosen], minlength=len(rows.actions))
         gained.append(float(np.mean(hits[shown > 0] / shown[shown > 0])))
     return gained

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import strategies as some
+from algorithm_1 import algorithm_1
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -33,7 +34,7 @@ from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import Quantity, Threshold
-from rebt_ros.paper.re_bt_espresso import bt_espresso, re_bt_espresso
+from rebt_ros.paper.re_bt_espresso import bt_espresso
 from rebt_ros.paper.rules import delta_close, leaf_rules
 
 FEATURES = (
@@ -213,7 +214,7 @@ def test_the_behavior_tree_chooses_what_the_decision_tree_predicts_at_every_feas
     root: Root, vocabulary: Vocabulary, table: DemonstrationTable
 ) -> None:
     trained = train(table, vocabulary=vocabulary, max_depth=4)
-    learned = as_learned(re_bt_espresso(trained.tree, delta=0.0, root=root), trained)
+    learned = as_learned(algorithm_1(trained.tree, delta=0.0, root=root), trained)
     feasible = feasible_states(trained.tree, table)
     expected = trained.predict(feasible)
     assert predicted_by_tree(learned.tree, trained, feasible) == expected.tolist()
@@ -240,7 +241,7 @@ def test_a_tree_with_readable_thresholds_is_chosen_by_exactly(
     expected = trained.predict(feasible)
     rules = leaf_rules(trained.tree, lambda leaf: (leaf.most_probable,))
     for tree in (
-        re_bt_espresso(trained.tree, delta=None, root=root),
+        algorithm_1(trained.tree, delta=None, root=root),
         reduced_tree(rules, root=root),
     ):
         assert predicted_by_tree(tree, trained, feasible) == expected.tolist()
@@ -293,7 +294,7 @@ def test_the_actions_offered_are_the_delta_close_ones_of_the_decision_trees_leaf
 ) -> None:
     trained = train(table, vocabulary=vocabulary, max_depth=2)
     feasible = feasible_states(trained.tree, table)
-    tree = re_bt_espresso(trained.tree, delta=delta, root=Root.PARALLEL)
+    tree = algorithm_1(trained.tree, delta=delta, root=Root.PARALLEL)
     groups = offered(tree, trained.tree.actions, feasible)
     literals_of = states_of(feasible)
     for conjunction, leaf in trained.tree.paths():
@@ -328,6 +329,6 @@ def reaching_all(node: nodes.Node) -> nodes.Node:
 def test_a_tie_is_decided_as_the_decision_tree_decides_it() -> None:
     leaf = Leaf((3, 5, 5, 0))
     actions = tuple(nodes.Action(label, "action") for label in LABELS)
-    tree = re_bt_espresso(DecisionTree(actions, leaf), delta=0.0)
+    tree = algorithm_1(DecisionTree(actions, leaf), delta=0.0)
     assert tree == nodes.ParallelSelector((actions[1], actions[2]))
     assert leaf.most_probable == 1

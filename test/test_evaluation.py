@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import strategies as some
+from algorithm_1 import algorithm_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,7 +27,6 @@ from rebt_ros.learning.evaluation import (
     teacher_forced_choices,
 )
 from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
-from rebt_ros.paper.re_bt_espresso import re_bt_espresso
 from rebt_ros.paper.rules import leaf_rules
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
@@ -111,7 +111,7 @@ def test_a_decision_tree_chooses_after_its_own_choices_what_its_behavior_trees_c
     rules = leaf_rules(trained.tree, lambda leaf: (leaf.most_probable,))
     for rows in (table, other, other.where(np.arange(len(other)) > 0)):
         chosen = decision_tree_choices(trained, rows).tolist()
-        for tree in (re_bt_espresso(trained.tree, delta=None), reduced_tree(rules)):
+        for tree in (algorithm_1(trained.tree, delta=None), reduced_tree(rules)):
             assert chosen == own_history_choices(tree, rows).tolist()
 
 

@@ -33,12 +33,13 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import DEEPEST_TREE
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.beyond_the_paper.single_loops import LoopTrees, loop_trees
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import LastActionIs, Literal
 from rebt_ros.paper.lat_cycles import CycleStart, remove_cycles
 from rebt_ros.paper.lat_graph import generate_graph
 from rebt_ros.paper.lat_occurrences import Occurrences, Runs
-from rebt_ros.paper.lat_trees import Demonstrated, LatTree, LeftOut, gen_lat_trees
+from rebt_ros.paper.lat_trees import LatTree, LeftOut, gen_lat_trees
 from rebt_ros.paper.re_bt_espresso import build_inv_set
 from rebt_ros.paper.rules import Rule
 
@@ -257,8 +258,13 @@ def test_a_complete_graph_of_30_actions_takes_about_a_second() -> None:
 
 def loops(rules: Iterable[Rule], *shown: str, most: int = 9) -> list[tuple[str, int]]:
     """The actions of the single loops and their support."""
-    found = gen_lat_trees(rules, tuple(map(tuple, shown)), most_loops=most).loops
-    return [("".join(flat_labels(one)), one.support) for one in found]
+    found = single_loops_of(rules, tuple(map(tuple, shown)), most=most)
+    return [("".join(flat_labels(one)), one.support) for one in found.trees]
+
+
+def single_loops_of(rules: Iterable[Rule], shown: Runs, *, most: int = 9) -> LoopTrees:
+    rules, occurrences = tuple(rules), Occurrences(shown)
+    return loop_trees(rules, gen_lat_trees(rules, occurrences).trees, occurrences, most=most)
 
 
 def flat_labels(tree: LatTree) -> list[str]:
@@ -267,7 +273,7 @@ def flat_labels(tree: LatTree) -> list[str]:
 
 def test_an_action_that_was_done_twice_in_a_row_is_a_loop_that_tests_its_whole_rule() -> None:
     rules = [rule("a", [c(0)], [c(1), lat("b")]), rule("b", [c(2)])]
-    (tree,) = gen_lat_trees(rules, (tuple("aabaaabb"), ("b",)), most_loops=1).loops
+    (tree,) = single_loops_of(rules, (tuple("aabaaabb"), ("b",)), most=1).trees
     assert tree.support == 2
     assert tree.subtree == repeater(either((c(0),), (c(1), lat_of("b", "a"))), "a")
     assert loops(rules, "aabaaabb", "b") == [("a", 2), ("b", 1)]
@@ -296,17 +302,19 @@ def test_a_path_that_was_done_twice_in_a_row_is_a_loop() -> None:
 def test_loops_beyond_the_number_asked_for_are_counted() -> None:
     rules = [rule("a", [c(0)]), rule("b", [c(1)])]
     assert loops(rules, "aabb", most=0) == []
-    assert gen_lat_trees(rules, (tuple("aabb"),), most_loops=1).left_out == LeftOut(loops=1)
+    assert single_loops_of(rules, (tuple("aabb"),), most=1).left_out == 1
 
 
 @given(rule_lists(), shown_runs)
 def test_what_is_remembered_of_demonstrations_changes_no_tree(
     rules: list[Rule], shown: Runs
 ) -> None:
-    remembering = Demonstrated(shown)
+    remembering = Occurrences(shown)
     for some_rules in (rules, rules[1:], rules):
-        assert gen_lat_trees(some_rules, remembering, most_loops=9) == gen_lat_trees(
-            some_rules, shown, most_loops=9
+        found = gen_lat_trees(some_rules, remembering)
+        assert found == gen_lat_trees(some_rules, shown)
+        assert loop_trees(some_rules, found.trees, remembering, most=9) == single_loops_of(
+            some_rules, shown
         )
 
 

@@ -25,7 +25,7 @@ from rebt_ros.logic.float_reduction import implied_literals, reduced
 from rebt_ros.logic.intervals import enclosing_literals, intervals_among, with_intervals
 from rebt_ros.logic.minimize import cubes, minimized_cover
 from rebt_ros.logic.numbered import Codes, Numbering
-from rebt_ros.paper.re_bt_espresso import rule_tree, with_root
+from rebt_ros.paper.rule_trees import rule_tree, with_root
 from rebt_ros.paper.rules import FactoredRule, Rule
 
 #: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and

@@ -28,8 +28,8 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.learning.evaluation import teacher_forced_choices
-from rebt_ros.paper.re_bt_espresso import bt_espresso, re_bt_espresso
-from rebt_ros.paper.rules import leaf_rules
+from rebt_ros.paper.re_bt_espresso import bt_espresso, main_tree
+from rebt_ros.paper.rules import dt_to_rules_psa, leaf_rules
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.study.configurations import read_configs
 from rebt_ros.study.reduction import Reductions, Size, SizeComparison
@@ -38,7 +38,7 @@ from rebt_ros.study.simulator.configuration import ExperimentConfig
 from rebt_ros.study.simulator.synthetic_robot import TICKS, ExperimentRobot, simulate
 
 _MODES: dict[str, Callable[[DecisionTree], nodes.Node]] = {
-    "paper": lambda tree: re_bt_espresso(tree, delta=0.0),
+    "paper": lambda tree: main_tree(dt_to_rules_psa(tree, 0.0)),
     "default": lambda tree: reduced_tree(leaf_rules(tree, lambda leaf: (leaf.most_probable,))),
 }
 

@@ -40,8 +40,8 @@ from rebt_ros.learning.cross_validation import (
 )
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.logic.conditions import Difference
-from rebt_ros.paper.re_bt_espresso import re_bt_espresso
-from rebt_ros.paper.rules import delta_close, leaf_rules
+from rebt_ros.paper.re_bt_espresso import main_tree
+from rebt_ros.paper.rules import delta_close, dt_to_rules, dt_to_rules_psa, leaf_rules
 
 #: With fewer rows the folds are too small to tell anything.
 _FEWEST_ROWS = 20
@@ -174,13 +174,10 @@ def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.
     Raises:
         OptionError: The root asked for makes no sense.
     """
-    delta = options.delta if psa else None
+    dt, delta = trained.tree, options.delta
     if options.reductions is None:
-        return re_bt_espresso(trained.tree, delta=delta, root=options.root)
-    rules = leaf_rules(
-        trained.tree,
-        lambda leaf: (leaf.most_probable,) if delta is None else delta_close(leaf, delta),
-    )
+        return main_tree(dt_to_rules_psa(dt, delta) if psa else dt_to_rules(dt), options.root)
+    rules = leaf_rules(dt, lambda leaf: delta_close(leaf, delta) if psa else (leaf.most_probable,))
     return reduced_tree(rules, options.reductions, options.root)
 
 

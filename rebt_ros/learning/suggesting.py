@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Suggestion
 from rebt_ros.beyond_the_paper.priority_root import MOST_LEAVES_MINIMIZED
 from rebt_ros.beyond_the_paper.routines.finding import FoundRoutine, find_routines
+from rebt_ros.beyond_the_paper.single_loops import loop_trees
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import TrainedTree, fit
 from rebt_ros.demonstration.last_action import History
@@ -25,8 +26,8 @@ from rebt_ros.learning.suggestions import (
     resolve,
     routine_suggestions,
 )
-from rebt_ros.paper.lat_occurrences import rows
-from rebt_ros.paper.lat_trees import Demonstrated, LatTrees, gen_lat_trees
+from rebt_ros.paper.lat_occurrences import Occurrences, rows
+from rebt_ros.paper.lat_trees import gen_lat_trees
 from rebt_ros.paper.re_bt_espresso import build_inv_set, logic_minimizer, reduce_floats
 from rebt_ros.paper.rules import dt_to_rules_psa
 
@@ -53,12 +54,12 @@ def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[Found
     return find_routines(table) if options.routines else ()
 
 
-def demonstrated_in(table: DemonstrationTable) -> Demonstrated:
+def occurrences_in(table: DemonstrationTable) -> Occurrences:
     """What was done in a table, row by row; it is the same at all pruning levels.
 
     Of a large table, only in its first rows.
     """
-    return Demonstrated(rows(table.where(np.arange(len(table)) < _MOST_ROWS)))
+    return Occurrences(rows(table.where(np.arange(len(table)) < _MOST_ROWS)))
 
 
 def suggest(
@@ -67,7 +68,7 @@ def suggest(
     ccp_alpha: float,
     options: LearnOptions,
     routines: Sequence[FoundRoutine] = (),
-    demonstrated: Demonstrated | None = None,
+    occurrences: Occurrences | None = None,
 ) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
     """What to offer: PSA nodes of the tree, and what a LAT-augmented tree tells about sequences.
 
@@ -77,7 +78,7 @@ def suggest(
         ccp_alpha: How far the LAT-augmented decision tree is pruned.
         options: How to learn.
         routines: What `routines_of` found in the table.
-        demonstrated: What `demonstrated_in` makes of the table, which saves time where several
+        occurrences: What `occurrences_in` makes of the table, which saves time where several
             trees are learned from it.
 
     Returns:
@@ -100,11 +101,10 @@ def suggest(
         with_lat = fitted.at(ccp_alpha)
     if _too_large(with_lat, options):
         return found, (_TOO_LARGE, *_on_left_out(left_out))
-    offered, lat_trees = _of_rules(table, trained, with_lat, options, routines, demonstrated)
-    left_out += lat_trees.left_out.paths + lat_trees.left_out.loops
+    offered, loops, not_built = _of_rules(table, trained, with_lat, options, routines, occurrences)
+    left_out += not_built
     room = _MOST_SUGGESTIONS - len(found)
     if not options.is_paper and len(offered) > room:
-        loops = {tree.subtree for tree in lat_trees.loops}
         ranked = sorted(offered, key=lambda one: (one.subtree not in loops, -one.support))
         left_out += len(ranked) - room
         offered = tuple(ranked[:room])
@@ -132,9 +132,9 @@ def _of_rules(
     with_lat: TrainedTree,
     options: LearnOptions,
     routines: Sequence[FoundRoutine],
-    demonstrated: Demonstrated | None,
-) -> tuple[tuple[Suggestion, ...], LatTrees]:
-    """PSA and LAT suggestions, and the LAT trees that they are made of.
+    occurrences: Occurrences | None,
+) -> tuple[tuple[Suggestion, ...], Set[nodes.Node], int]:
+    """PSA and LAT suggestions, which of their subtrees are single loops, and how many are left out.
 
     Args:
         table: The rows that were learned from.
@@ -142,22 +142,26 @@ def _of_rules(
         with_lat: The one that may test LAT.
         options: How to learn.
         routines: Which there are.
-        demonstrated: What was done in the table, if that is known.
+        occurrences: In the table, if they are known.
     """
     psa_rules = reduce_floats(logic_minimizer(dt_to_rules_psa(trained.tree, options.delta)))
     rules = dt_to_rules_psa(with_lat.tree, options.delta)
-    lat_trees = gen_lat_trees(
-        reduce_floats(logic_minimizer(rules)),
-        demonstrated or demonstrated_in(table),
-        inv_set=build_inv_set(rules),
-        least_support=0 if options.is_paper else 1,
-        most_loops=_MOST_LOOPS if options.is_paper else _LOOPS_BESIDE_ROUTINES * bool(routines),
+    inv_set = build_inv_set(rules)
+    rules = reduce_floats(logic_minimizer(rules))
+    occurrences = occurrences or occurrences_in(table)
+    lat = gen_lat_trees(
+        rules, occurrences, inv_set=inv_set, least_support=0 if options.is_paper else 1
     )
-    offered = (
-        *psa_suggestions(psa_rules),
-        *lat_suggestions((*lat_trees.trees, *lat_trees.loops)),
+    loops = loop_trees(
+        rules,
+        lat.trees,
+        occurrences,
+        inv_set=inv_set,
+        most=_MOST_LOOPS if options.is_paper else _LOOPS_BESIDE_ROUTINES * bool(routines),
     )
-    return offered, lat_trees
+    offered = (*psa_suggestions(psa_rules), *lat_suggestions((*lat.trees, *loops.trees)))
+    left_out = lat.left_out.paths + loops.left_out
+    return offered, frozenset(tree.subtree for tree in loops.trees), left_out
 
 
 def accept(

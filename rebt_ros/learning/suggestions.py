@@ -16,7 +16,7 @@ from rebt_ros.errors import OptionError
 from rebt_ros.logic.conditions import Literal
 from rebt_ros.logic.factoring import pull_out_common
 from rebt_ros.paper.lat_trees import LatTree
-from rebt_ros.paper.re_bt_espresso import rule_tree, with_root
+from rebt_ros.paper.rule_trees import rule_tree, with_root
 from rebt_ros.paper.rules import FactoredRule, Rule
 
 #: Stands for the ids of all suggestions.

@@ -81,6 +81,11 @@ def remove_cycles(
         occurrences: The demonstrations.
         start: Which node a cycle starts with.
     """
+    key = (remove_cycles, graph, start)
+    return occurrences.remembered(key, lambda: _without_cycles(graph, occurrences, start))
+
+
+def _without_cycles(graph: LatGraph, occurrences: Occurrences, start: CycleStart) -> Acyclic:
     work = _Work(graph, occurrences)
     closed = tuple(ClosedCycle(work.cycle_node(one, start), n) for one, n in work.closed_cycles())
     while (cycle := work.next_cycle()) is not None:

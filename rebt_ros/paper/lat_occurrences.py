@@ -15,16 +15,18 @@ once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import reduce
 from itertools import groupby
 from operator import or_
-from typing import TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.paper.lat_graph import ActionNode, GraphNode
+
+_Found = TypeVar("_Found")
 
 #: Labels of the actions of each demonstration; neighbours differ, or are rows.
 Runs: TypeAlias = tuple[tuple[str, ...], ...]
@@ -74,6 +76,17 @@ class Occurrences:
         self._compiled: dict[GraphNode, _Compiled] = {}
         self._counted: dict[tuple[GraphNode, ...], tuple[int, int]] = {}
         self.everywhere: _Places = (1 << (length + 1)) - 1
+        self._found: dict[Hashable, Any] = {}
+
+    def remembered(self, key: Hashable, find: Callable[[], _Found]) -> _Found:
+        """What was found in the demonstrations by this key, searched for only once.
+
+        Many pruning levels have the same LAT graph.
+        """
+        if key not in self._found:
+            self._found[key] = find()
+        found: _Found = self._found[key]
+        return found
 
     def count(self, path: Sequence[GraphNode]) -> int:
         """How often the path occurs: the longest occurrences, from left to right, no overlaps."""

@@ -49,6 +49,11 @@ def source_to_sink_paths(
         most: How many paths to return at most.
         least_support: How often a path must have occurred.
     """
+    key = (source_to_sink_paths, graph, most, least_support)
+    return occurrences.remembered(key, lambda: _paths(graph, occurrences, most, least_support))
+
+
+def _paths(graph: LatGraph, occurrences: Occurrences, most: int, least_support: int) -> LatPaths:
     engine = nx.DiGraph()
     engine.add_nodes_from(range(len(graph.nodes)))
     engine.add_edges_from(graph.edges)

@@ -18,10 +18,6 @@ Differences from the printed algorithm:
 - A path that is one cycle node gives its Repeater without a Sequence over it, and an action without
   edges gives nothing, as its rule is in the main tree.
 - The number of paths is bounded.
-
-Beside the paths, Repeaters of single loops can be asked for (`single_loops`): replacing one cycle
-after the other leaves one Repeater of each bundle of cycles, in which the simple ones are nested
-where nobody finds them.
 """
 
 from __future__ import annotations
@@ -34,24 +30,21 @@ from rebt_ros.logic.conditions import LastActionIs, Literal
 from rebt_ros.logic.dnf import Conjunction, Dnf
 from rebt_ros.logic.factoring import pull_out_common
 from rebt_ros.logic.float_reduction import float_reduction
-from rebt_ros.paper.lat_cycles import Acyclic, CycleStart, remove_cycles
+from rebt_ros.paper.lat_cycles import CycleStart, remove_cycles
 from rebt_ros.paper.lat_graph import (
     ActionNode,
     CycleNode,
     GraphNode,
-    LatGraph,
     generate_graph,
     last_action,
 )
 from rebt_ros.paper.lat_occurrences import Occurrences, Runs
-from rebt_ros.paper.lat_paths import LatPath, LatPaths, source_to_sink_paths
-from rebt_ros.paper.re_bt_espresso import action_tree, condition_trees
+from rebt_ros.paper.lat_paths import source_to_sink_paths
+from rebt_ros.paper.rule_trees import action_tree, condition_trees
 from rebt_ros.paper.rules import Rule
 
 #: LAT trees that are built unless told otherwise.
 MOST_PATHS = 64
-#: Repeaters of single loops that are built unless told otherwise.
-MOST_LOOPS = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +67,6 @@ class LeftOut:
     """Edges of cycles that would have been nested too deep (see `lat_cycles`)."""
     self_loops: int = 0
     """PSA groups of which one member was shown after another one."""
-    loops: int = 0
-    """Single loops beyond the number that was asked for, if any was."""
 
     def __bool__(self) -> bool:
         return self != LeftOut()
@@ -88,66 +79,37 @@ class LatTrees:
     trees: tuple[LatTree, ...]
     """The best supported first, of equals the longest path."""
     left_out: LeftOut
-    loops: tuple[LatTree, ...] = ()
-    """Repeaters of single loops that are none of the trees, the best supported first."""
-
-
-class Demonstrated:
-    """Demonstrations and what was found in them: many pruning levels have the same LAT graph."""
-
-    def __init__(self, shown: Runs) -> None:
-        """Takes the actions of each demonstration, one per row (see `lat_occurrences.rows`)."""
-        self.occurrences = Occurrences(shown)
-        self._acyclic: dict[tuple[LatGraph, CycleStart], Acyclic] = {}
-        self._paths: dict[tuple[LatGraph, int, int], LatPaths] = {}
-
-    def acyclic(self, graph: LatGraph, start: CycleStart) -> Acyclic:
-        """The graph without its cycles."""
-        key = (graph, start)
-        if key not in self._acyclic:
-            self._acyclic[key] = remove_cycles(graph, self.occurrences, start)
-        return self._acyclic[key]
-
-    def paths(self, graph: LatGraph, most: int, least_support: int) -> LatPaths:
-        """The best supported paths of a graph without cycles."""
-        key = (graph, most, least_support)
-        if key not in self._paths:
-            self._paths[key] = source_to_sink_paths(
-                graph, self.occurrences, most=most, least_support=least_support
-            )
-        return self._paths[key]
 
 
 def gen_lat_trees(
     rules: Iterable[Rule],
-    shown: Runs | Demonstrated = (),
+    shown: Runs | Occurrences = (),
     *,
     inv_set: frozenset[Literal] = frozenset(),
     start: CycleStart = CycleStart.MOST_FREQUENT,
     most_paths: int = MOST_PATHS,
     least_support: int = 0,
-    most_loops: int = MOST_LOOPS,
 ) -> LatTrees:
     """GEN_LAT_TREES: a Sequence, or a Repeater, for every path of actions through the rules.
 
     Args:
         rules: Minimized and float-reduced, but unfactored.
-        shown: The actions of each demonstration; loops of one action need all rows (see
-            `lat_occurrences.rows`).  Where several trees are made of the same demonstrations,
-            `Demonstrated` saves searching them again.
+        shown: The actions of each demonstration, one per row or per run.  Where several trees are
+            made of the same demonstrations, `Occurrences` saves searching them again.
         inv_set: Literals to be shown as Inverters (Algorithm 1, line 3).
         start: Which node a cycle starts with; the linked code of the paper chooses arbitrarily.
         most_paths: How many trees to build at most.
         least_support: How often a path must have occurred; 0, as in the paper, also keeps those
             that the rules allow for but nobody has shown as a whole.
-        most_loops: How many Repeaters of single loops to build at most.
     """
     rules = tuple(rules)
-    demonstrated = shown if isinstance(shown, Demonstrated) else Demonstrated(shown)
+    occurrences = shown if isinstance(shown, Occurrences) else Occurrences(shown)
     dnfs = {ActionNode(rule.actions): rule.dnf for rule in rules}
     graph = generate_graph(rules)  # line 2
-    acyclic = demonstrated.acyclic(graph, start)  # line 3
-    found = demonstrated.paths(acyclic.graph, most_paths, least_support)
+    acyclic = remove_cycles(graph, occurrences, start)  # line 3
+    found = source_to_sink_paths(
+        acyclic.graph, occurrences, most=most_paths, least_support=least_support
+    )
     return_list = []
     for path in found.paths:  # line 4
         match path.nodes:
@@ -157,47 +119,8 @@ def gen_lat_trees(
                 steps = path_steps(path.nodes, dnfs, inv_set)
                 subtree = nodes.Sequence(steps, memory=True)  # line 5
         return_list.append(LatTree(path.nodes, path.support, subtree))  # line 22
-    there = {path.nodes for path in found.paths}
-    loops = (
-        [
-            loop
-            for loop in single_loops(graph, acyclic, found.paths, demonstrated.occurrences)
-            if (loop[0],) not in there
-        ]
-        if most_loops
-        else []
-    )
-    repeaters = tuple(
-        LatTree((cycle,), support, repeater(cycle, dnfs, inv_set))
-        for cycle, support in loops[:most_loops]
-    )
-    left_out = LeftOut(
-        found.left_out, acyclic.edges, acyclic.self_loops, len(loops) - len(repeaters)
-    )
-    return LatTrees(tuple(return_list), left_out, repeaters)  # line 24
-
-
-def single_loops(
-    graph: LatGraph, acyclic: Acyclic, paths: Iterable[LatPath], occurrences: Occurrences
-) -> list[tuple[CycleNode, int]]:
-    """Loops that were shown and how often, the most frequent first, of equals the shortest.
-
-    - The simple cycles of the LAT graph: how often the demonstrations closed them.
-    - An action or PSA group that was done twice or more in a row: how often it was.  LAT is the
-      last *different* action, so that the graph has no edge for it, or at most, between the members
-      of a group, one from the group to itself.
-    - A path of actions that was done twice or more in a row: how often it was.  A rule that tells
-      by ``LAT != a`` when its action begins the path again has no edge for it either.
-    """
-    loops = {one.cycle: one.times for one in acyclic.closed}
-    for node in graph.nodes:
-        if isinstance(node, ActionNode) and (times := occurrences.repetitions(node)):
-            loops.setdefault(CycleNode((node,)), times)
-    for path in paths:
-        of_actions = all(isinstance(node, ActionNode) for node in path.nodes)
-        if of_actions and (times := occurrences.count((*path.nodes, *path.nodes))):
-            loops.setdefault(CycleNode(path.nodes), times)
-    return sorted(loops.items(), key=lambda loop: (-loop[1], len(loop[0].path)))
+    left_out = LeftOut(found.left_out, acyclic.edges, acyclic.self_loops)
+    return LatTrees(tuple(return_list), left_out)  # line 24
 
 
 def repeater(

@@ -3,53 +3,80 @@
 Differences from the printed algorithm, which change no behavior:
 
 - A Selector or Sequence with a single child is left out: the child stands in its place.
-- The root can be a memoryless Selector.  The paper allows for it; unlike a Parallel, which fails
-  as soon as one child fails, it can be executed when actions take longer than a tick.
+- LAT trees are returned beside the main tree, not under its root: "an end user is needed to
+  manually edit and add the subtrees" (paper, III-B); `learning.suggestions.attach` adds them.
+
+By default, the package runs neither: `beyond_the_paper.priority_root` makes a smaller tree with the
+same behavior from the same rules.  `LearnOptions.paper()` asks for Algorithm 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.tree import DecisionTree
-from rebt_ros.errors import OptionError
 from rebt_ros.logic import factoring, float_reduction, inverses, minimize
 from rebt_ros.logic.conditions import Literal
-from rebt_ros.logic.factoring import Factored
+from rebt_ros.paper.lat_occurrences import Runs
+from rebt_ros.paper.lat_trees import LatTrees, gen_lat_trees
+from rebt_ros.paper.rule_trees import rule_tree, with_root
 from rebt_ros.paper.rules import FactoredRule, Rule, dt_to_rules, dt_to_rules_psa
 
 
-def re_bt_espresso(
-    dt: DecisionTree, *, delta: float | None = 0.3, root: Root = Root.PARALLEL
-) -> nodes.Node:
+@dataclass(frozen=True, slots=True)
+class MainAndLatTrees:
+    """The result of Algorithm 1."""
+
+    main: nodes.Node
+    """A Parallel over one subtree per rule, each of which triggers its action, or its PSA node,
+    exactly where the decision tree's leaf does."""
+    lat: LatTrees
+    """What the paper adds to the root, and offers to the user as SAES."""
+
+
+def re_bt_espresso(dt: DecisionTree, shown: Runs = (), *, delta: float = 0.3) -> MainAndLatTrees:
     """Algorithm 1: converts a decision tree into a behavior tree.
 
     Args:
         dt: The decision tree.
-        delta: Threshold of δ-close actions, in [0, 1] (paper: 0.3); None to trigger the most
-            probable action alone, and so to have no PSA nodes, which the paper offers as SAES.
-        root: Kind of the root node (paper: Parallel).
-
-    Returns:
-        The main tree: a root over one subtree per rule, each of which triggers its action, or its
-        PSA node, exactly where the decision tree's leaf does.
+        shown: The actions of each demonstration, by which LAT trees are ranked; the paper has the
+            rules alone.
+        delta: Threshold of δ-close actions, in [0, 1] (paper: 0.3).
     """
-    rules = dt_to_rules(dt) if delta is None else dt_to_rules_psa(dt, delta)  # line 2
+    rules = dt_to_rules_psa(dt, delta)  # line 2
     inv_set = build_inv_set(rules)  # line 3
-    rules = logic_minimizer(rules)  # line 4
-    rules = reduce_floats(rules)  # line 5
-    factored = pullout_common(rules)  # line 6
-    return with_root(root, [rule_tree(rule, inv_set) for rule in factored])  # lines 7 to 28
+    rule_dnfs = logic_minimizer(rules)  # line 4
+    rule_dnfs = reduce_floats(rule_dnfs)  # line 5
+    factored = pullout_common(rule_dnfs)  # line 6
+    root = with_root(Root.PARALLEL, [rule_tree(dnf, inv_set) for dnf in factored])  # lines 7 to 28
+    lat_trees = gen_lat_trees(rule_dnfs, shown, inv_set=inv_set)  # line 29
+    return MainAndLatTrees(root, lat_trees)  # lines 30 to 33
 
 
-def bt_espresso(dt: DecisionTree, *, root: Root = Root.PARALLEL) -> nodes.Node:
+def main_tree(rules: Iterable[Rule], root: Root = Root.PARALLEL) -> nodes.Node:
+    """Lines 3 to 28: the tree of rules that may be those of single actions, under any root.
+
+    A memoryless Selector root, which the paper allows for, can be executed when actions take longer
+    than a tick: a Parallel fails as soon as one child fails.
+
+    Args:
+        rules: From `dt_to_rules_psa`, or from `dt_to_rules` where PSA nodes are offered as SAES.
+        root: Kind of the root node.
+    """
+    rules = tuple(rules)
+    inv_set = build_inv_set(rules)
+    factored = pullout_common(reduce_floats(logic_minimizer(rules)))
+    return with_root(root, [rule_tree(rule, inv_set) for rule in factored])
+
+
+def bt_espresso(dt: DecisionTree) -> nodes.Node:
     """The baseline: most probable actions, no Inverters, no reductions (French et al., 2019)."""
-    rules = dt_to_rules(dt)
-    rules = logic_minimizer(rules)
+    rules = logic_minimizer(dt_to_rules(dt))
     unfactored = [FactoredRule(rule.actions, factoring.unfactored(rule.dnf)) for rule in rules]
-    return with_root(root, [rule_tree(rule, frozenset()) for rule in unfactored])
+    return with_root(Root.PARALLEL, [rule_tree(rule, frozenset()) for rule in unfactored])
 
 
 def build_inv_set(rules: Iterable[Rule]) -> frozenset[Literal]:
@@ -72,54 +99,3 @@ def reduce_floats(rules: Iterable[Rule]) -> tuple[Rule, ...]:
 def pullout_common(rules: Iterable[Rule]) -> tuple[FactoredRule, ...]:
     """PULLOUT_COMMON: the rules with the literals that all their conjunctions share in front."""
     return tuple(FactoredRule(one.actions, factoring.pull_out_common(one.dnf)) for one in rules)
-
-
-def rule_tree(rule: FactoredRule, inv_set: frozenset[Literal]) -> nodes.Node:
-    """Lines 9 to 26: a Sequence of the rule's condition and its action."""
-    return sequence([*condition_trees(rule.condition, inv_set), action_tree(rule.actions)])
-
-
-def action_tree(actions: tuple[nodes.Action, ...]) -> nodes.Node:
-    """Line 10: the action, or the PSA node over several."""
-    return actions[0] if len(actions) == 1 else nodes.ParallelSelector(actions)
-
-
-def with_root(root: Root, children: Sequence[nodes.Node]) -> nodes.Node:
-    """Line 7: the rule trees under the root.
-
-    Raises:
-        OptionError: A Sequence over several rules, no two of which ever hold in the same state.
-    """
-    if len(children) == 1:
-        return children[0]
-    match root:
-        case Root.PARALLEL:
-            return nodes.Parallel(tuple(children))
-        case Root.SELECTOR:
-            return nodes.Selector(tuple(children))
-        case Root.SEQUENCE:
-            raise OptionError(
-                f"a Sequence root would fail in every state, as no two of the {len(children)} "
-                "rules hold in the same one: choose selector or parallel."
-            )
-
-
-def condition_trees(condition: Factored, inv_set: frozenset[Literal]) -> list[nodes.Node]:
-    """Lines 14 to 26: what must succeed, one after the other, before the action."""
-    trees: list[nodes.Node] = [_literal_tree(literal, inv_set) for literal in condition.common]
-    if condition.alternatives:
-        alternatives = [sequence(condition_trees(one, inv_set)) for one in condition.alternatives]
-        trees.append(nodes.Selector(tuple(alternatives)))
-    return trees
-
-
-def _literal_tree(literal: Literal, inv_set: frozenset[Literal]) -> nodes.Node:
-    """Lines 17 to 23."""
-    if inv_set and literal in inv_set:
-        return nodes.Inverter(nodes.Condition(~literal))
-    return nodes.Condition(literal)
-
-
-def sequence(children: Sequence[nodes.Node]) -> nodes.Node:
-    """A Sequence of the children, or the only child itself."""
-    return children[0] if len(children) == 1 else nodes.Sequence(tuple(children))

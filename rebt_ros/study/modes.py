@@ -18,8 +18,9 @@ from rebt_ros.learning.choice import convert
 from rebt_ros.learning.options import DEFAULTS, LearnOptions
 from rebt_ros.learning.suggesting import accept, suggest
 from rebt_ros.learning.suggestions import ALL
-from rebt_ros.paper.lat_trees import Demonstrated
-from rebt_ros.paper.re_bt_espresso import bt_espresso, re_bt_espresso
+from rebt_ros.paper import re_bt_espresso
+from rebt_ros.paper.lat_occurrences import Occurrences
+from rebt_ros.paper.rules import dt_to_rules_psa
 from rebt_ros.study.settings import MAX_DEPTH, MOST_SUGGESTIONS
 
 
@@ -48,7 +49,7 @@ def main_tree(mode: Mode, trained: TrainedTree) -> nodes.Node:
     """The behavior tree of a decision tree, without suggestions."""
     match mode:
         case Mode.BASELINE:
-            return bt_espresso(trained.tree)
+            return re_bt_espresso.bt_espresso(trained.tree)
         case Mode.PAPER:
             return convert(trained, LearnOptions.paper(), psa=True)
         case Mode.DEFAULT:
@@ -64,7 +65,9 @@ def plain_tree(mode: Mode, tree: DecisionTree, main: nodes.Node) -> nodes.Node:
         tree: The decision tree.
         main: What `main_tree` made of it.
     """
-    return re_bt_espresso(tree, delta=0.0) if mode is Mode.PAPER else main
+    if mode is Mode.PAPER:
+        return re_bt_espresso.main_tree(dt_to_rules_psa(tree, 0.0))
+    return main
 
 
 def offer(
@@ -74,7 +77,7 @@ def offer(
     main: nodes.Node,
     ccp_alpha: float,
     routines: Sequence[FoundRoutine],
-    demonstrated: Demonstrated,
+    occurrences: Occurrences,
 ) -> Offer:
     """The generated subtrees of a pruning level.
 
@@ -85,18 +88,18 @@ def offer(
         main: What `main_tree` made of it.
         ccp_alpha: How far it is pruned.
         routines: What was found in the table, for the default.
-        demonstrated: What was done in the table.
+        occurrences: In the table.
     """
     if mode is Mode.BASELINE:
         return Offer(under_root(main), 0)
     if mode is Mode.PAPER:
         options = replace(LearnOptions.paper(), attach=(ALL,))
-        suggestions, _ = suggest(table, trained, ccp_alpha, options, demonstrated=demonstrated)
+        suggestions, _ = suggest(table, trained, ccp_alpha, options, occurrences=occurrences)
         attached, _ = accept(main, suggestions, options)
         # A single rule gets a root once something is attached.
         return Offer(under_root(attached), len(suggestions))
     options = replace(DEFAULTS, max_depth=MAX_DEPTH)
-    suggestions, _ = suggest(table, trained, ccp_alpha, options, routines, demonstrated)
+    suggestions, _ = suggest(table, trained, ccp_alpha, options, routines, occurrences)
     if len(suggestions) > MOST_SUGGESTIONS:
         raise AssertionError(f"{len(suggestions)} suggestions by default")
     subtrees = tuple(one.subtree for one in suggestions)

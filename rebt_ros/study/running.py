@@ -15,8 +15,8 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, RebtError
 from rebt_ros.learning.options import DEFAULTS
-from rebt_ros.learning.suggesting import demonstrated_in, routines_of
-from rebt_ros.paper.lat_trees import Demonstrated
+from rebt_ros.learning.suggesting import occurrences_in, routines_of
+from rebt_ros.paper.lat_occurrences import Occurrences
 from rebt_ros.study.agreement import held_out_agreements
 from rebt_ros.study.configurations import Lost, digest
 from rebt_ros.study.edit_distance.labelled_tree import labelled
@@ -109,12 +109,12 @@ def _levels(table: DemonstrationTable) -> dict[Mode, list[_Level]]:
         return made
     fitted = fit(table, vocabulary=Vocabulary(History.LAST), max_depth=MAX_DEPTH)
     routines = routines_of(table, DEFAULTS)
-    demonstrated = demonstrated_in(table)
+    occurrences = occurrences_in(table)
     for ccp_alpha in fitted.path.alphas.tolist():
         trained = fitted.at(ccp_alpha)
         baseline = Size.of(main_tree(Mode.BASELINE, trained))
         for mode, levels in made.items():
-            levels.append(_level(mode, table, trained, ccp_alpha, baseline, routines, demonstrated))
+            levels.append(_level(mode, table, trained, ccp_alpha, baseline, routines, occurrences))
     return made
 
 
@@ -125,10 +125,10 @@ def _level(
     ccp_alpha: float,
     baseline: Size,
     routines: Sequence[FoundRoutine],
-    demonstrated: Demonstrated,
+    occurrences: Occurrences,
 ) -> _Level:
     main = main_tree(mode, trained)
-    offered = offer(mode, table, trained, main, ccp_alpha, routines, demonstrated)
+    offered = offer(mode, table, trained, main, ccp_alpha, routines, occurrences)
     # Of trees whose leaves all choose one action, BT-Espresso makes a single node as well.
     decides = len({leaf.most_probable for _, leaf in trained.tree.paths()}) > 1
     sizes = (
