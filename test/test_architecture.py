@@ -35,7 +35,7 @@ LAYERS: Final = (
     {"decision_tree"},
     {"behavior_tree"},
     {"demonstration"},
-    {"logic"},
+    {"logic", "message_path"},
     {"errors", "arrays", "streams"},
 )
 DEPTH: Final = {unit: depth for depth, units in enumerate(LAYERS) for unit in units}

@@ -1,0 +1,134 @@
+"""Ranges of a LaserScan, by the rules of its message.
+
+Above range_max, or infinite: nothing is there as far as the sensor sees, which is range_max.  Below
+range_min, or NaN: the sensor does not know, and the range is missing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rebt_ros.arrays import FloatArray
+
+#: How far a beam may be off the end of a slice, in shares of the angle between two beams.
+_TOLERANCE: Final = 1e-3
+
+
+class Scan(Protocol):
+    """What is read of a LaserScan."""
+
+    angle_min: float
+    """Radians, as below."""
+    angle_increment: float
+    range_min: float
+    """Meters, as below."""
+    range_max: float
+    ranges: Sequence[float]
+
+
+def range_at(scan: Scan, index: int) -> float | None:
+    """One range; None where it is missing or there is no such beam."""
+    try:
+        distance = float(scan.ranges[index])
+    except IndexError:
+        return None
+    return min(distance, _most(scan)) if distance >= scan.range_min else None
+
+
+class Beams:
+    """Reads the ranges of some beams.
+
+    Args:
+        first: The first of them: an index, negative from the end, or an angle; None for the first
+            there is.
+        last: The last one, likewise.
+        by_angle: Whether both are angles in degrees; from the first, counter-clockwise.
+    """
+
+    def __init__(self, first: float | None, last: float | None, by_angle: bool) -> None:
+        self._chosen: Callable[[Scan, int], Any]
+        if by_angle and first is not None and last is not None:
+            self._first, self._last = math.radians(first), math.radians(last)
+            self._chosen = self._between
+        else:
+            start = None if first is None else int(first)
+            stop = None if last is None or last == -1 else int(last) + 1
+            part = slice(start, stop)
+            self._chosen = lambda scan, count: part
+        # Scans of one sensor have the same angles as a rule.
+        self._known: tuple[int, float, float] | None = None
+        self._beams: slice | NDArray[np.intp] = slice(0)
+
+    def ranges(self, scan: Scan) -> FloatArray:
+        """The ranges, NaN where one is missing; shape (beams,)."""
+        part, known = self._read(scan)
+        return np.where(known, np.minimum(part, _most(scan)), np.nan)
+
+    def least(self, scan: Scan) -> float | None:
+        """The smallest of the ranges; None where all are missing."""
+        part, known = self._read(scan)
+        there = part[known]
+        return min(float(there.min()), _most(scan)) if there.size else None
+
+    def largest(self, scan: Scan) -> float | None:
+        """The largest of the ranges; None where all are missing."""
+        part, known = self._read(scan)
+        there = part[known]
+        return min(float(there.max()), _most(scan)) if there.size else None
+
+    def mean(self, scan: Scan) -> float | None:
+        """The mean of the ranges; None where all are missing."""
+        part, known = self._read(scan)
+        there = part[known]
+        if not there.size:
+            return None
+        return float(np.minimum(there, _most(scan)).mean(dtype=np.float64))
+
+    def _read(self, scan: Scan) -> tuple[Any, Any]:
+        """The beams' ranges as they are in the message, and which of them are not missing."""
+        ranges = np.asarray(scan.ranges)
+        part = ranges[self._chosen(scan, len(ranges))]
+        return part, part >= scan.range_min
+
+    def _between(self, scan: Scan, count: int) -> slice | NDArray[np.intp]:
+        """The beams between two angles."""
+        key = (count, scan.angle_min, scan.angle_increment)
+        if key != self._known:
+            self._known = key
+            self._beams = _between(self._first, self._last, *key)
+        return self._beams
+
+
+def _most(scan: Scan) -> float:
+    """The largest range there can be; infinite where the message does not tell."""
+    return scan.range_max if scan.range_max > 0 else math.inf
+
+
+def _between(
+    first: float, last: float, count: int, angle_min: float, increment: float
+) -> slice | NDArray[np.intp]:
+    """The beams from one angle to another, counter-clockwise, in this order.
+
+    >>> _between(-0.1, 0.1, 63, 0.0, 0.1)
+    array([62,  0,  1])
+    """
+    if not (math.isfinite(angle_min) and math.isfinite(increment)):
+        return slice(0)
+    tolerance = _TOLERANCE * abs(increment)
+    circle = 2 * math.pi
+    # A whole turn, and more, is all of it.
+    width = last - first if 0 <= last - first < circle else (last - first) % circle
+    if last - first >= circle - 1e-9:
+        width = circle
+    offsets = (angle_min + increment * np.arange(count) - first + tolerance) % circle
+    beams = np.flatnonzero(offsets <= width + 2 * tolerance)
+    ordered = beams[np.argsort(offsets[beams], kind="stable")]
+    if ordered.size and np.all(np.diff(ordered) == 1):
+        # To slice costs less than to pick.
+        return slice(int(ordered[0]), int(ordered[-1]) + 1)
+    return ordered

@@ -1,0 +1,100 @@
+"""The message types of a bag, for decoding and as the definitions of message paths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.base import normalize_fieldname
+
+from rebt_ros.message_path.definition import FILLER, Field, MessageType, Primitive
+from rebt_ros.message_path.errors import MessagePathError
+
+#: Bytes before the values of a message, and what tells their order.
+_HEAD: Final = 4
+_BIG, _LITTLE = b"\0\0", b"\0\1"
+#: What rclpy.serialization leaves behind an empty array of numbers of 8 bytes, or two.
+_MOST_PADDING: Final = 15
+
+_PRIMITIVES: Final = {
+    "bool": Primitive.TRUTH,
+    "byte": Primitive.BYTE,
+    "octet": Primitive.BYTE,
+    "float32": Primitive.NUMBER,
+    "float64": Primitive.NUMBER,
+    "float128": Primitive.NUMBER,
+    "string": Primitive.TEXT,
+    "wstring": Primitive.TEXT,
+}
+
+
+class BagTypes:
+    """The types of ROS 2 Jazzy, and those that a bag defines.
+
+    Args:
+        definitions: Definitions in the bag by the name of their type, as `.msg` files have them,
+            those of the types within them included.  They are looked at when they are needed, and
+            only where ROS 2 has no type of that name.
+    """
+
+    def __init__(self, definitions: Mapping[str, str] | None = None) -> None:
+        self._definitions = definitions or {}
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._known: dict[str, MessageType] = {}
+
+    def __call__(self, name: str) -> MessageType:
+        """The definition of a type.
+
+        Raises:
+            MessagePathError: It is not known.
+        """
+        if name not in self._known:
+            self._known[name] = self._definition(name)
+        return self._known[name]
+
+    def decode(self, data: bytes, name: str) -> object:
+        """A message of a type that is known.
+
+        Raises:
+            Exception: The data are no such message; rosbags raises whatever it meets.
+        """
+        order = data[:2]
+        if len(data) < _HEAD or order not in (_BIG, _LITTLE):
+            raise ValueError("it does not begin like a message")
+        about = self._store.get_msgdef(name)
+        read = about.deserialize_cdr_le if order == _LITTLE else about.deserialize_cdr_be
+        message, end = read(data[_HEAD:], 0, about.cls, self._store)
+        if end + _HEAD + _MOST_PADDING < len(data):
+            raise ValueError("it is longer than its type")
+        return message
+
+    def _definition(self, name: str) -> MessageType:
+        if name not in self._store.fielddefs:
+            raise MessagePathError(
+                f"the type {name} is none of ROS 2 Jazzy, and the bag does not define it."
+            )
+        constants, fields = self._store.fielddefs[name]
+        return MessageType(
+            name,
+            tuple(_field(field, its) for field, its in fields if field != FILLER),
+            _whole(constants),
+        )
+
+
+def _whole(constants: Iterable[tuple[str, str, Any]]) -> dict[str, int]:
+    return {
+        name: value
+        for name, kind, value in constants
+        if kind != "bool" and isinstance(value, int) and not isinstance(value, bool)
+    }
+
+
+def _field(name: str, descriptor: Any) -> Field:
+    node, about = descriptor
+    is_array = node in (Nodetype.ARRAY, Nodetype.SEQUENCE)
+    if is_array:
+        node, about = about[0]
+    kind = about if node == Nodetype.NAME else _PRIMITIVES.get(about[0], Primitive.INTEGER)
+    return Field(name, kind, is_array, normalize_fieldname(name))
