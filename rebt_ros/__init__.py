@@ -1,7 +1,8 @@
 """Learn a robot's behavior tree from demonstrations, while the robot runs or from files.
 
-`learn` and `replay` are what most scripts need; `LearnOptions` and `InputOptions` hold their
-options.  They are imported when first used, so that nodes which do not learn start quickly.
+`learn`, `replay` and `Policy` are what most scripts need; `LearnOptions` and `InputOptions` hold
+their options.  The other names are the types of their parameters and results.  All are imported
+when first used, so that nodes which do not learn start quickly.
 """
 
 from __future__ import annotations
@@ -10,23 +11,103 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
+    from rebt_ros.behavior_tree.learned_tree import (
+        ChannelProvenance,
+        Figures,
+        LearnedTree,
+        Provenance,
+        Root,
+        Suggestion,
+        SuggestionKind,
+    )
+    from rebt_ros.behavior_tree.nodes import (
+        Action,
+        Condition,
+        Inverter,
+        Node,
+        Parallel,
+        ParallelSelector,
+        Repeater,
+        Selector,
+        Sequence,
+    )
+    from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
+    from rebt_ros.beyond_the_paper.priority_root import Reductions
     from rebt_ros.decision_tree.upsampling import Upsampling
+    from rebt_ros.demonstration.builder import StateTopic
+    from rebt_ros.demonstration.demonstration import RowKind
     from rebt_ros.demonstration.last_action import History
-    from rebt_ros.errors import RebtError
+    from rebt_ros.demonstration.schema import Feature, FeatureKind
+    from rebt_ros.errors import DocumentError, InputError, OptionError, RebtError
     from rebt_ros.learning.options import LearnOptions, Use
-    from rebt_ros.learning.policy import Policy
-    from rebt_ros.offline.learn_and_replay import learn, replay
+    from rebt_ros.learning.pipeline import Learning, Progress
+    from rebt_ros.learning.policy import Decision, Policy, State
+    from rebt_ros.learning.replaying import Disagreement, Replay
+    from rebt_ros.learning.suggestions import PsaChoice
+    from rebt_ros.logic.conditions import (
+        Difference,
+        HasCategory,
+        Interval,
+        IsTrue,
+        LastActionIs,
+        Literal,
+        PreviousActionIs,
+        Threshold,
+    )
+    from rebt_ros.offline.learn_and_replay import OfflineLearning, learn, replay
+    from rebt_ros.storage.account import Account
     from rebt_ros.storage.inputs import InputOptions
 
 __all__ = [
+    "Account",
+    "Action",
+    "ChannelProvenance",
+    "Condition",
+    "Decision",
+    "Difference",
+    "Disagreement",
+    "DocumentError",
+    "Feature",
+    "FeatureKind",
+    "Figures",
+    "HasCategory",
     "History",
+    "InputError",
     "InputOptions",
+    "Interval",
+    "Inverter",
+    "IsTrue",
+    "LastActionIs",
     "LearnOptions",
     "LearnedTree",
+    "Learning",
+    "Literal",
+    "Node",
+    "OfflineLearning",
+    "OptionError",
+    "Parallel",
+    "ParallelSelector",
     "Policy",
+    "PreviousActionIs",
+    "Progress",
+    "Provenance",
+    "PsaChoice",
     "RebtError",
+    "Reductions",
+    "Repeater",
+    "Replay",
     "Root",
+    "RowKind",
+    "Selector",
+    "Sequence",
+    "ShownChannel",
+    "ShownLeaf",
+    "Span",
+    "State",
+    "StateTopic",
+    "Suggestion",
+    "SuggestionKind",
+    "Threshold",
     "Upsampling",
     "Use",
     "learn",
@@ -34,13 +115,55 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Account": "rebt_ros.storage.account",
+    "Action": "rebt_ros.behavior_tree.nodes",
+    "ChannelProvenance": "rebt_ros.behavior_tree.learned_tree",
+    "Condition": "rebt_ros.behavior_tree.nodes",
+    "Decision": "rebt_ros.learning.policy",
+    "Difference": "rebt_ros.logic.conditions",
+    "Disagreement": "rebt_ros.learning.replaying",
+    "DocumentError": "rebt_ros.errors",
+    "Feature": "rebt_ros.demonstration.schema",
+    "FeatureKind": "rebt_ros.demonstration.schema",
+    "Figures": "rebt_ros.behavior_tree.learned_tree",
+    "HasCategory": "rebt_ros.logic.conditions",
     "History": "rebt_ros.demonstration.last_action",
+    "InputError": "rebt_ros.errors",
     "InputOptions": "rebt_ros.storage.inputs",
+    "Interval": "rebt_ros.logic.conditions",
+    "Inverter": "rebt_ros.behavior_tree.nodes",
+    "IsTrue": "rebt_ros.logic.conditions",
+    "LastActionIs": "rebt_ros.logic.conditions",
     "LearnOptions": "rebt_ros.learning.options",
     "LearnedTree": "rebt_ros.behavior_tree.learned_tree",
+    "Learning": "rebt_ros.learning.pipeline",
+    "Literal": "rebt_ros.logic.conditions",
+    "Node": "rebt_ros.behavior_tree.nodes",
+    "OfflineLearning": "rebt_ros.offline.learn_and_replay",
+    "OptionError": "rebt_ros.errors",
+    "Parallel": "rebt_ros.behavior_tree.nodes",
+    "ParallelSelector": "rebt_ros.behavior_tree.nodes",
     "Policy": "rebt_ros.learning.policy",
+    "PreviousActionIs": "rebt_ros.logic.conditions",
+    "Progress": "rebt_ros.learning.pipeline",
+    "Provenance": "rebt_ros.behavior_tree.learned_tree",
+    "PsaChoice": "rebt_ros.learning.suggestions",
     "RebtError": "rebt_ros.errors",
+    "Reductions": "rebt_ros.beyond_the_paper.priority_root",
+    "Repeater": "rebt_ros.behavior_tree.nodes",
+    "Replay": "rebt_ros.learning.replaying",
     "Root": "rebt_ros.behavior_tree.learned_tree",
+    "RowKind": "rebt_ros.demonstration.demonstration",
+    "Selector": "rebt_ros.behavior_tree.nodes",
+    "Sequence": "rebt_ros.behavior_tree.nodes",
+    "ShownChannel": "rebt_ros.behavior_tree.shown",
+    "ShownLeaf": "rebt_ros.behavior_tree.shown",
+    "Span": "rebt_ros.behavior_tree.shown",
+    "State": "rebt_ros.learning.policy",
+    "StateTopic": "rebt_ros.demonstration.builder",
+    "Suggestion": "rebt_ros.behavior_tree.learned_tree",
+    "SuggestionKind": "rebt_ros.behavior_tree.learned_tree",
+    "Threshold": "rebt_ros.logic.conditions",
     "Upsampling": "rebt_ros.decision_tree.upsampling",
     "Use": "rebt_ros.learning.options",
     "learn": "rebt_ros.offline.learn_and_replay",

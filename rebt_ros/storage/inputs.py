@@ -22,26 +22,27 @@ from rebt_ros.storage.text import unreadable
 
 @dataclass(frozen=True, slots=True)
 class InputOptions:
-    """How to read inputs; see `read_csv` and `read_bag` for what each means."""
+    """How to read inputs; `read_csv` and `read_bag` say more about each."""
 
     labels: tuple[str, ...] = ()
-    """For CSV tables."""
+    """Of CSV tables, the columns that hold the actions; by default the last column."""
     header: bool = True
-    """For CSV tables."""
+    """Of CSV tables: whether the first line names the columns."""
     row_kind: RowKind | None = None
-    """For CSV tables."""
+    """Of CSV tables, what a row is; None to tell by the columns."""
     features: frozenset[str] = frozenset()
-    """For CSV tables."""
+    """Of CSV tables, columns that are features even where their names say that they number or date
+    the rows."""
     channels: tuple[str, ...] = ()
-    """For CSV tables."""
+    """Of CSV tables that have all of these columns, the labels where `labels` names none."""
     state_topics: tuple[StateTopic, ...] = ()
-    """For bags."""
+    """Of bags, the topics of the state; by default the only one of numbers."""
     action_topics: tuple[str, ...] = ()
-    """For bags."""
+    """Of bags, the topics of the actions; by default the only one of texts."""
     sample_rate: float | None = None
-    """For bags."""
+    """Of bags, rows per second and channel while an action holds; None for a row per action."""
     skip_bad: bool = False
-    """For bags."""
+    """Of bags: whether messages that cannot be used are left out, instead of the bag refused."""
 
 
 @dataclass(frozen=True, slots=True)
