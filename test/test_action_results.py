@@ -1,8 +1,10 @@
 """Actions that run until the robot says how they ended."""
 
+import strategies as some
 from py_trees.common import Status
 
-from rebt_ros.behavior_tree.nodes import Action
+from rebt_ros.behavior_tree.nodes import Action, Parallel
+from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.live.action_results import ActionResults
 
 GO, TURN = Action("go", "action"), Action("turn", "action")
@@ -64,3 +66,16 @@ def test_a_label_may_hold_a_colon() -> None:
     results.update(Action("say: hello", "action"))
     assert results.report("say: hello:success")
     assert results.update(Action("say: hello", "action")) is Status.SUCCESS
+
+
+def test_under_a_parallel_the_first_action_has_the_channel_until_it_ends() -> None:
+    results = ActionResults()
+    runtime = TreeRuntime(some.learned(Parallel((GO, TURN))), results)
+    sent = []
+    for word in ("", "", "go:success", "turn:success", "success"):
+        results.report(word)
+        results.begin_tick()
+        [command] = runtime.tick((0.0,) * 4).commands
+        sent.append((command, results.started))
+    # A Parallel begins anew with its first child.
+    assert sent == [(GO, True), (GO, False), (TURN, True), (GO, True), (TURN, True)]

@@ -93,9 +93,9 @@ class Executed:
         self._runtime = TreeRuntime(learned, tree=tree)
 
     def act(self, message: Sequence[float]) -> Decision:
-        """The last action of each channel is the one that is sent."""
-        ticked = self._runtime.tick(self._encoder.encode({"state": message})).actions
-        latest = {action.channel: action.label for action in ticked}
+        """The command of each channel is what is sent."""
+        commands = self._runtime.tick(self._encoder.encode({"state": message})).commands
+        latest = {action.channel: action.label for action in commands}
         if len(self._channels) == 1:
             return latest.get(self._channels[0])
         return {channel: latest.get(channel) for channel in self._channels}

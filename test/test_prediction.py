@@ -16,7 +16,7 @@ from rebt_ros.behavior_tree.prediction import (
     history_columns,
     triggered,
 )
-from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.behavior_tree.runtime import Tick, TreeRuntime
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
@@ -31,13 +31,11 @@ def values(drawn: list[tuple[float, ...]]) -> np.ndarray:
     return np.array(drawn, dtype=np.float64).reshape(len(drawn), len(some.FEATURES))
 
 
-def first_ticks(
-    tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
-) -> list[tuple[nodes.Action, ...]]:
-    """What a runtime of its own, with the given history, takes in each state."""
+def first_ticks(tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]) -> list[Tick]:
+    """What a runtime of its own, with the given history, does in each state."""
     learned = some.learned(tree)
     return [
-        TreeRuntime(learned, histories={some.CHANNEL: ActionHistory(earlier)}).tick(state).actions
+        TreeRuntime(learned, histories={some.CHANNEL: ActionHistory(earlier)}).tick(state)
         for state in drawn
     ]
 
@@ -50,21 +48,21 @@ def test_what_is_triggered_is_what_a_first_tick_takes(
     history = as_it_stands(ActionHistory(earlier))
     ticked = triggered(tree, States(some.FEATURES, values(drawn), history))
     assert tuple(ticked) == nodes.actions(tree)
-    for row, actions in enumerate(first_ticks(tree, drawn, earlier)):
-        assert {action for action, where in ticked.items() if where[row]} == set(actions)
+    for row, tick in enumerate(first_ticks(tree, drawn, earlier)):
+        assert {action for action, where in ticked.items() if where[row]} == set(tick.actions)
 
 
 @settings(max_examples=80)
 @given(some.trees(repeaters=False), rows, taken)
-def test_what_is_chosen_is_the_first_action_that_the_tree_names_of_those_taken(
+def test_what_is_chosen_is_the_command_of_a_first_tick(
     tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
 ) -> None:
     states = States(some.FEATURES, values(drawn), as_it_stands(ActionHistory(earlier)))
     chosen = choose(tree, some.ACTIONS, states)
     assert chosen.dtype == np.int64
-    for code, actions in zip(chosen.tolist(), first_ticks(tree, drawn, earlier), strict=True):
-        named = [one for one in nodes.actions(tree) if one in actions]
-        assert code == (some.ACTIONS.index(named[0]) if named else NO_ACTION)
+    for code, tick in zip(chosen.tolist(), first_ticks(tree, drawn, earlier), strict=True):
+        assert len(tick.commands) <= 1
+        assert code == (some.ACTIONS.index(tick.commands[0]) if tick.commands else NO_ACTION)
 
 
 @settings(max_examples=60)
@@ -94,12 +92,12 @@ def test_what_a_tree_of_rules_chooses_is_what_its_tick_takes(
     tree: nodes.Node, drawn: list[tuple[float, ...]], earlier: list[str]
 ) -> None:
     states = States(some.FEATURES, values(drawn), as_it_stands(ActionHistory(earlier)))
-    for code, actions in zip(
+    for code, tick in zip(
         choose(tree, some.ACTIONS, states).tolist(),
         first_ticks(tree, drawn, earlier),
         strict=True,
     ):
-        assert actions == (() if code == NO_ACTION else (some.ACTIONS[code],))
+        assert tick.actions == (() if code == NO_ACTION else (some.ACTIONS[code],))
 
 
 @settings(max_examples=60)
@@ -175,12 +173,15 @@ def test_a_condition_that_is_tested_again_gives_the_same_answer() -> None:
     ("tree", "chosen"),
     [
         (GO, 0),
-        (nodes.Sequence((TURN, GO)), 2),
+        (nodes.Sequence((TURN, GO)), 0),
         (nodes.Selector((TURN, GO)), 2),
         (nodes.ParallelSelector((WAIT, GO)), 3),
         (nodes.Parallel((GRASP, GO)), 1),
-        (nodes.Repeater((TURN, WAIT)), 2),
-        (nodes.Selector((nodes.Inverter(GRASP), GO)), 1),
+        (nodes.Parallel((GRASP, nodes.Sequence((GO, WAIT)))), 1),
+        (nodes.Parallel((nodes.Sequence((GRASP, GO)), WAIT)), 0),
+        (nodes.Sequence((nodes.Parallel((GRASP, GO)), WAIT)), 3),
+        (nodes.Repeater((TURN, WAIT)), 3),
+        (nodes.Selector((nodes.Inverter(GRASP), GO)), 0),
         (nodes.Condition(some.at_most("distance", 0.3)), NO_ACTION),
     ],
 )

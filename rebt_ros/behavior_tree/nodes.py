@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 from typing import TypeAlias
 
 from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs, features_of
@@ -73,7 +74,10 @@ class Selector(_Control):
 
 @dataclass(frozen=True, slots=True)
 class Parallel(_Control):
-    """Runs all its children at every tick; succeeds when all have, fails when one does."""
+    """Runs all its children at every tick; succeeds when all have, fails when one does.
+
+    Where several of them act on the same channel, the first one has it (see `precedence`).
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +127,50 @@ def depth(node: Node) -> int:
 def actions(node: Node) -> tuple[Action, ...]:
     """Each action of the tree once, in the order in which it first occurs."""
     return tuple(dict.fromkeys(one for one in walk(node) if isinstance(one, Action)))
+
+
+def is_reactive(node: Node) -> bool:
+    """Whether a tick takes one action at most, and leaves nothing behind but the history.
+
+    Actions that stand together under a Parallel count as the one that has the channel.
+    """
+    for one in walk(node):
+        match one:
+            case Sequence(memory=True) | Selector(memory=True) | Repeater():
+                return False
+            case Parallel() if not all(isinstance(child, Action) for child in one.children):
+                return False
+            case Inverter() if actions(one):
+                return False
+            case Sequence():
+                if any(actions(child) for child in one.children[:-1]):
+                    return False
+    return True
+
+
+def precedence(node: Node) -> tuple[int, ...]:
+    """Which of several actions that are ticked together is the command of their channel.
+
+    A channel carries one command at a time.  What is ticked later takes the place of what was
+    ticked before, as where one step of a Sequence has ended and the next begins.  The children of a
+    Parallel begin together: the first one that acts has the channel, which of a PSA group is the
+    best supported action.
+
+    Returns:
+        For each leaf that is an action, in the order of `walk`, its rank: the highest of those
+        ticked is the command.
+    """
+    ascending = _ascending(node, count())
+    ranks = dict(zip(ascending, count(), strict=False))
+    return tuple(ranks[leaf] for leaf in range(len(ascending)))
+
+
+def _ascending(node: Node, numbers: Iterator[int]) -> list[int]:
+    """The numbers of the leaves that are actions, those that give way first."""
+    if isinstance(node, Action):
+        return [next(numbers)]
+    below = [_ascending(child, numbers) for child in children(node)]
+    return [leaf for one in (below[::-1] if isinstance(node, Parallel) else below) for leaf in one]
 
 
 def conditions(node: Node) -> tuple[Condition, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, partial, reduce
+from itertools import count
 from operator import and_
 from typing import TypeAlias
 
@@ -159,8 +160,8 @@ def choose(tree: nodes.Node, actions: tuple[nodes.Action, ...], states: States) 
         states: The rows to evaluate.
 
     Returns:
-        Positions in `actions`, shape (rows,); `NO_ACTION` where the tree takes none of them.  Where
-        a Parallel takes several, it is the first that the tree names.
+        Positions in `actions`, shape (rows,); `NO_ACTION` where the tree takes none, or another
+        one.  Where it takes several, it is the command (see `nodes.precedence`).
     """
     return Plan(tree, states.features).choose(actions, states)
 
@@ -171,11 +172,16 @@ class Plan:
     def __init__(self, tree: nodes.Node, features: tuple[Feature, ...]) -> None:
         self.actions = nodes.actions(tree)
         """In the order in which the tree names them."""
+        leaves = [node for node in nodes.walk(tree) if isinstance(node, nodes.Action)]
+        numbers = {action: number for number, action in enumerate(self.actions)}
+        self._leaf_actions = tuple(numbers[leaf] for leaf in leaves)
+        ranks = nodes.precedence(tree)
+        # From the leaf that has its channel before all others on.
+        self._descending = sorted(range(len(leaves)), key=ranks.__getitem__, reverse=True)
         conditions = dict.fromkeys(one.literal.condition for one in nodes.conditions(tree))
         self._conditions = tuple(conditions)
         place = {condition: number for number, condition in enumerate(conditions)}
-        acted = {action: number for number, action in enumerate(self.actions)}
-        self._root = _step(tree, place, acted)
+        self._root = _step(tree, place, count())
         # Of what is tested, the columns that are read.
         by_name = {feature.name: number for number, feature in reversed([*enumerate(features)])}
         read = {by_name[name] for name in nodes.features(tree)}
@@ -186,16 +192,34 @@ class Plan:
     def choose(self, actions: tuple[nodes.Action, ...], states: States) -> IntArray:
         """As the function of this name."""
         chosen = np.full(len(states), NO_ACTION, dtype=np.int64)
-        code = [actions.index(one) if one in actions else None for one in self.actions]
-        for rows, ticked in self.ticked(states):
-            # The first that is named is written last.
-            for number, where in reversed([*zip(code, ticked, strict=True)]):
-                if number is not None:
-                    np.putmask(chosen[rows], where, number)
+        code = [actions.index(one) if one in actions else NO_ACTION for one in self.actions]
+        for rows, part in self._parts(states):
+            for number, mask in zip(code, self._commands(part), strict=True):
+                np.putmask(chosen[rows], _unpacked(mask, part.rows), number)
         return chosen
+
+    def _commands(self, part: _Part) -> list[_Mask]:
+        """Where each action is the command."""
+        commands = [part.nowhere() for _ in self.actions]
+        decided = part.nowhere()
+        for leaf in self._descending:
+            reached = part.reached[leaf]
+            if reached is not None:
+                commands[self._leaf_actions[leaf]] |= reached & ~decided
+                decided |= reached
+        return commands
 
     def ticked(self, states: States) -> Iterator[tuple[slice, list[BoolArray]]]:
         """In which rows each action is ticked, part by part of the rows."""
+        for rows, part in self._parts(states):
+            ticked = [part.nowhere() for _ in self.actions]
+            for number, reached in zip(self._leaf_actions, part.reached, strict=True):
+                if reached is not None:
+                    ticked[number] |= reached
+            yield rows, [_unpacked(mask, part.rows) for mask in ticked]
+
+    def _parts(self, states: States) -> Iterator[tuple[slice, _Part]]:
+        """What the tree does, part by part of the rows."""
         before = {
             number: states.history(condition)
             for number, condition in enumerate(self._conditions)
@@ -204,11 +228,11 @@ class Plan:
         columns = np.empty((len(self._columns), min(len(states), _ROWS_AT_A_TIME)))
         for start in range(0, len(states), _ROWS_AT_A_TIME):
             rows = slice(start, min(start + _ROWS_AT_A_TIME, len(states)))
-            count = rows.stop - start
             _copy_columns(states.values[rows], self._columns, columns)
-            part = _Part(count, len(self.actions), partial(self._holds, columns, before, rows))
-            self._root(part, _packed(np.ones(count, dtype=bool)))
-            yield rows, [_unpacked(mask, count) for mask in part.ticked]
+            holds = partial(self._holds, columns, before, rows)
+            part = _Part(rows.stop - start, len(self._leaf_actions), holds)
+            self._root(part, _packed(np.ones(part.rows, dtype=bool)))
+            yield rows, part
 
     def _holds(
         self,
@@ -236,12 +260,16 @@ class Plan:
 class _Part:
     """Some rows while a tree is evaluated on them."""
 
-    def __init__(self, rows: int, actions: int, holds: Callable[[int], _Mask]) -> None:
-        words = -(-rows // _BITS)
-        self.ticked = [np.zeros(words, dtype=np.uint64) for _ in range(actions)]
-        """Where each action is ticked."""
+    def __init__(self, rows: int, leaves: int, holds: Callable[[int], _Mask]) -> None:
+        self.rows = rows
+        self.reached: list[_Mask | None] = [None] * leaves
+        """Where each leaf that is an action is ticked; None where that is nowhere."""
         self.holds = cache(holds)
         """Where a condition holds, by its number."""
+
+    def nowhere(self) -> _Mask:
+        """None of the rows."""
+        return np.zeros(-(-self.rows // _BITS), dtype=np.uint64)
 
 
 def _copy_columns(values: FloatArray, chosen: tuple[int, ...], columns: FloatArray) -> None:
@@ -262,10 +290,14 @@ def _unpacked(mask: _Mask, rows: int) -> BoolArray:
     return np.unpackbits(mask.view(np.uint8), count=rows, bitorder="little").view(np.bool_)
 
 
-def _step(
-    node: nodes.Node, place: Mapping[Condition, int], acted: Mapping[nodes.Action, int]
-) -> _Step:
-    """What a node does, with numbers instead of conditions and actions."""
+def _step(node: nodes.Node, place: Mapping[Condition, int], leaves: Iterator[int]) -> _Step:
+    """What a node does, with numbers instead of conditions.
+
+    Args:
+        node: The node.
+        place: The number of each condition.
+        leaves: Numbers of the leaves that are actions, which come in the order of `nodes.walk`.
+    """
     match node:
         case nodes.Condition(literal=literal):
             number = place[literal.condition]
@@ -273,21 +305,21 @@ def _step(
                 return lambda part, reached: reached & part.holds(number)
             return lambda part, reached: reached & ~part.holds(number)
         case nodes.Action():
-            return partial(_act, acted[node])
+            return partial(_act, next(leaves))
         case nodes.Inverter(child=child):
-            inverted = _step(child, place, acted)
+            inverted = _step(child, place, leaves)
             # What succeeds was reached, so that the rest is what differs.
             return lambda part, reached: reached ^ inverted(part, reached)
         case nodes.Sequence(children=children) | nodes.Repeater(children=children):
-            return partial(_all_in_turn, [_step(child, place, acted) for child in children])
+            return partial(_all_in_turn, [_step(child, place, leaves) for child in children])
         case nodes.Selector(children=children) | nodes.ParallelSelector(children=children):
-            return partial(_first_in_turn, [_step(child, place, acted) for child in children])
+            return partial(_first_in_turn, [_step(child, place, leaves) for child in children])
         case nodes.Parallel(children=children):
-            return partial(_all_at_once, [_step(child, place, acted) for child in children])
+            return partial(_all_at_once, [_step(child, place, leaves) for child in children])
 
 
-def _act(number: int, part: _Part, reached: _Mask) -> _Mask:
-    part.ticked[number] |= reached
+def _act(leaf: int, part: _Part, reached: _Mask) -> _Mask:
+    part.reached[leaf] = reached
     return reached
 
 

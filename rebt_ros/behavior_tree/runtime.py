@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import py_trees
 from py_trees.common import Status
@@ -64,6 +64,9 @@ class Tick:
     status: Status
     actions: tuple[nodes.Action, ...]
     """Actions that were ticked, in order."""
+    commands: tuple[nodes.Action, ...]
+    """Of each channel on which actions were ticked, the one that is its command: one that runs, if
+    any does, and of several the one that `nodes.precedence` ranks highest."""
 
 
 def executable(tree: nodes.Node) -> nodes.Node:
@@ -83,7 +86,8 @@ class TreeRuntime:
 
     The previous action, which conditions may test, is on each channel the command of the last tick
     where the tree was learned from samples.  Where it was learned from events, it is the action
-    that ended last, be it that it was interrupted.
+    that ended last, be it that it was interrupted.  An action of a Parallel that had to leave the
+    channel to another one was not done.
 
     Args:
         learned: The tree and its features.
@@ -105,12 +109,15 @@ class TreeRuntime:
         self.histories.update(histories or {})
         self._commander = SucceedAtOnce() if commander is None else commander
         self._state: Sequence[float] = ()
-        self._ticked: list[tuple[nodes.Action, Status]] = []
+        self._ticked: list[_Ticked] = []
         # Of trees that were learned from events, what runs on each channel.
         self._running: dict[str, str] = {}
         self._wording = Wording(learned)
         self._place = {feature.name: place for place, feature in enumerate(learned.features)}
-        self._behaviours = self._build_root(learned.tree if tree is None else tree)
+        tree = learned.tree if tree is None else tree
+        # Actions are built in the order of `walk`.
+        self._ranks = iter(nodes.precedence(tree))
+        self._behaviours = self._build_root(tree)
         self.root = self._behaviours[0]
 
     def tick(self, state: Sequence[float]) -> Tick:
@@ -122,13 +129,18 @@ class TreeRuntime:
         self._state = state
         self._ticked.clear()
         self.root.tick_once()
+        done = _in_turn(self._ticked)
         # Afterwards, so that all conditions of one tick see the same history.
-        for action, status in self._ticked:
-            self._note(action, status)
+        for one in done:
+            self._note(one.action, one.status)
         if self._running:
             # What ran and was not ticked was interrupted, and nothing has taken its place.
-            self._end(self._running.keys() - {action.channel for action, _ in self._ticked})
-        return Tick(self.root.status, tuple(action for action, _ in self._ticked))
+            self._end(self._running.keys() - {one.action.channel for one in done})
+        return Tick(
+            self.root.status,
+            tuple([one.action for one in self._ticked]),
+            tuple({one.action.channel: one.action for one in done}.values()),
+        )
 
     def _note(self, action: nodes.Action, status: Status) -> None:
         history = self.histories[action.channel]
@@ -211,7 +223,7 @@ class TreeRuntime:
                 holds = self._test_condition(literal.condition, history)
                 return _Test(name, holds, positive=literal.positive)
             case nodes.Action():
-                return _Command(name, node, self._commander, self._ticked)
+                return _Command(name, node, next(self._ranks), self._commander, self._ticked)
             case nodes.Inverter():
                 return py_trees.decorators.Inverter(name=name, child=children[0])
             case nodes.Sequence(memory=memory):
@@ -294,6 +306,29 @@ class _Test(_Leaf):
         return self._if_true if self._holds() else self._if_false
 
 
+class _Ticked(NamedTuple):
+    """An action in one tick."""
+
+    action: nodes.Action
+    status: Status
+    rank: int
+    """By `nodes.precedence`."""
+
+
+def _in_turn(ticked: Sequence[_Ticked]) -> Sequence[_Ticked]:
+    """Those that had their channel one after the other; the last one of each is its command."""
+    if len(ticked) < 2:
+        return ticked
+    found: list[_Ticked] = []
+    highest: dict[str, tuple[bool, int]] = {}
+    for one in ticked:
+        claim = (one.status is Status.RUNNING, one.rank)
+        if claim >= highest.get(one.action.channel, claim):
+            highest[one.action.channel] = claim
+            found.append(one)
+    return found
+
+
 class _Command(_Leaf):
     """An action, carried out by the commander."""
 
@@ -301,17 +336,19 @@ class _Command(_Leaf):
         self,
         name: str,
         action: nodes.Action,
+        rank: int,
         commander: Commander,
-        ticked: list[tuple[nodes.Action, Status]],
+        ticked: list[_Ticked],
     ) -> None:
         super().__init__(name)
         self._action = action
+        self._rank = rank
         self._commander = commander
         self._ticked = ticked
 
     def update(self) -> Status:
         status = self._commander.update(self._action)
-        self._ticked.append((self._action, status))
+        self._ticked.append(_Ticked(self._action, status, self._rank))
         return status
 
     def terminate(self, new_status: Status) -> None:

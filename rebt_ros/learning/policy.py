@@ -57,7 +57,7 @@ class Policy:
         self._encoding = _Encoding(self.learned.features)
         root = executable(self.learned.tree)
         self._channels = nodes.policies(root)
-        self._ticked = not all(map(_is_reactive, self._channels.values()))
+        self._ticked = not all(map(nodes.is_reactive, self._channels.values()))
         self._plans = {
             channel: Plan(its, self.learned.features) for channel, its in self._channels.items()
         }
@@ -168,10 +168,10 @@ class _Episode:
         self._runtime = TreeRuntime(learned, tree=tree) if ticked else None
 
     def tick(self, state: Sequence[float]) -> dict[str, str | None]:
-        """What the ticked tree does: on each channel the last action, as the executor sends it."""
+        """What the ticked tree does: the command of each channel, as the executor sends it."""
         assert self._runtime is not None
-        latest = {one.channel: one.label for one in self._runtime.tick(state).actions}
-        return {channel: latest.get(channel) for channel in self._channels}
+        commands = {one.channel: one.label for one in self._runtime.tick(state).commands}
+        return {channel: commands.get(channel) for channel in self._channels}
 
 
 class _Encoding:
@@ -234,19 +234,3 @@ class _Encoding:
                 f"the feature {feature.name!r} is {feature.kind.value}, not the text {value!r}."
             )
         return float(value)
-
-
-def _is_reactive(tree: nodes.Node) -> bool:
-    """Whether a tick takes one action at most, and leaves nothing behind but the history."""
-    for node in nodes.walk(tree):
-        match node:
-            case nodes.Sequence(memory=True) | nodes.Selector(memory=True):
-                return False
-            case nodes.Repeater() | nodes.Parallel():
-                return False
-            case nodes.Inverter(child=child) if nodes.actions(child):
-                return False
-            case nodes.Sequence(children=children):
-                if any(nodes.actions(child) for child in children[:-1]):
-                    return False
-    return True

@@ -24,7 +24,12 @@ class ActionResults:
         self._updated = self.started = False
 
     def update(self, action: nodes.Action) -> Status:
-        """Running until there is a result."""
+        """Running until there is a result.
+
+        Where another action runs in this tick, as under a Parallel, it waits for the channel.
+        """
+        if self._updated and self._running not in (None, action):
+            return Status.RUNNING
         self._updated = True
         if action != self._running:
             self._running, self._result, self.started = action, None, True

@@ -110,15 +110,14 @@ class CommandChannels:
             if channel.results:
                 channel.results.begin_tick()
 
-    def send(self, actions: Sequence[nodes.Action]) -> int:
-        """Sends, on each channel, the last action that was ticked.
+    def send(self, commands: Sequence[nodes.Action]) -> int:
+        """Sends the commands of a tick, at most one for each channel.
 
         Returns:
             How many commands went out.
         """
-        latest = {action.channel: action.label for action in actions}
         return sum(
-            self._channels[name].send(label, self._every_tick) for name, label in latest.items()
+            self._channels[one.channel].send(one.label, self._every_tick) for one in commands
         )
 
     def send_to_all(self, label: str) -> None:

@@ -333,9 +333,9 @@ class ExecutorNode(Node):
         self._resting = False
         self._moving = True
         self._channels.begin_tick()
-        actions = program.runtime.tick(program.inputs.state()).actions
+        commands = program.runtime.tick(program.inputs.state()).commands
         self._ticks += 1
-        self._commands += self._channels.send(actions)
+        self._commands += self._channels.send(commands)
         self._slowest = max(self._slowest, time.perf_counter() - began)
 
     def _is_familiar(self, program: TreeProgram) -> bool:
