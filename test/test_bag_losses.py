@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import re
 import shutil
 import sqlite3
+import struct
+import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import lz4.frame
+import mcap_files as mcap
 import pytest
 from fuzz import corpus
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from rosbags.rosbag2 import StoragePlugin
 
+from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.errors import InputError
+from rebt_ros.storage import packing
 from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.inputs import load
+from rebt_ros.storage.mcap import _records
 from rebt_ros.storage.read import Read
+from rebt_ros.storage.sqlite_pages import SqlitePages
 
 MCAP, SQLITE = StoragePlugin.MCAP, StoragePlugin.SQLITE3
 
@@ -32,13 +45,13 @@ def _execute(bag: Path, *statements: str) -> None:
     connection.close()
 
 
-def _log_of_sqlite(bag: Path) -> None:
-    """Leaves half of the messages in the write-ahead log, as a killed recorder does."""
+def _log_of_sqlite(bag: Path, which: str = "id % 2") -> None:
+    """Leaves some of the messages in the write-ahead log, as a killed recorder does."""
     (file,) = bag.glob("*.db3")
     connection = sqlite3.connect(file)
     connection.execute("PRAGMA journal_mode = WAL")
-    connection.execute("CREATE TABLE half AS SELECT * FROM messages WHERE id % 2")
-    connection.execute("DELETE FROM messages WHERE id % 2")
+    connection.execute(f"CREATE TABLE half AS SELECT * FROM messages WHERE {which}")
+    connection.execute(f"DELETE FROM messages WHERE {which}")
     connection.commit()
     connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     connection.execute("INSERT INTO messages SELECT * FROM half")
@@ -136,3 +149,233 @@ def test_a_directory_of_bags_and_recordings_is_not_read_in_part(tmp_path: Path) 
     (tmp_path / "all" / "one.rec").write_bytes(recording)
     with pytest.raises(InputError, match="holds bags and recordings"):
         load([tmp_path / "all"])
+
+
+# --- several types on a topic -----------------------------------------------------------------
+
+
+def _with_kinds(path: Path) -> Path:
+    """A file of demonstrations, where others also publish on the topics, or did for a while."""
+    channels = (
+        *mcap.CHANNELS,
+        mcap.Channel("/state", "std_msgs/msg/Float32MultiArray"),
+        mcap.Channel("/action", mcap.ACTION, "json"),
+    )
+    messages = mcap.demonstration()
+    messages[4:4] = [mcap.Message(2, 4, b"\0\1\0\0")] * 3
+    messages[9:9] = [mcap.Message(3, 8, b'{"data": "go"}')] * 2
+    return mcap.write(path, messages, channels)
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_messages_of_the_type_are_read_and_those_of_other_types_are_noted(
+    tmp_path: Path, *, named: bool
+) -> None:
+    states = [StateTopic("/state")] if named else []
+    read = read_bag(_with_kinds(tmp_path / "bag.mcap"), state_topics=states)
+    assert len(read.demonstration) == 20
+    assert read.notes == (
+        "left out: json messages on /action: 2",
+        "left out: messages on /state of type std_msgs/msg/Float32MultiArray: 3",
+    )
+    assert read.account is not None
+    assert not read.account.missing
+
+
+def test_a_topic_on_which_no_type_fits_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"must be of type .*: there is /action \(std_msgs/msg/S"):
+        read_bag(_with_kinds(tmp_path / "bag.mcap"), action_topics=["/state"])
+
+
+def test_types_without_their_msg_are_the_same_types(tmp_path: Path) -> None:
+    channels = [replace(one, kind=one.kind.replace("/msg", "")) for one in mcap.CHANNELS]
+    read = read_bag(mcap.write(tmp_path / "bag.mcap", mcap.demonstration(), channels))
+    assert (len(read.demonstration), read.notes) == (20, ())
+
+
+# --- damage -----------------------------------------------------------------------------------
+
+
+def test_after_a_damaged_chunk_the_next_ones_are_read_and_no_state_is_made_up(
+    tmp_path: Path,
+) -> None:
+    path = mcap.write(tmp_path / "bag.mcap", mcap.demonstration(), per_chunk=5)
+    with path.open("rb") as file:
+        begins = [start - 9 for kind, start, _ in _records(file) if kind == 6]
+    data = bytearray(path.read_bytes())
+    # Of 5 messages each: the chunk after this one begins with an action.
+    data[begins[2] : begins[2] + 9] = b"\xff" * 9
+    path.write_bytes(data)
+    read = read_bag(path)
+    assert any("is damaged from byte" in note for note in read.notes)
+    assert "left out: 1 action after messages that are missing, whose state is not known" in (
+        read.notes
+    )
+    labels = read.demonstration.actions
+    rows = {
+        int(stamp): (state, labels[code])
+        for stamp, state, code in zip(
+            read.demonstration.stamps,
+            read.demonstration.states.tolist(),
+            read.demonstration.chosen,
+            strict=True,
+        )
+    }
+    assert len(rows) == 17
+    for stamp, (state, label) in rows.items():
+        number = stamp // 2 - 1
+        assert (state, label) == ([number / 3, -number], ("go", "turn", "wait")[number % 3])
+    assert read.account is not None
+    assert (read.account.stated, read.account.read) == (40, 34)
+
+
+def test_chunks_packed_by_other_means_are_named(tmp_path: Path) -> None:
+    path = mcap.write(tmp_path / "bag.mcap", mcap.demonstration(), compression=mcap.Compression.LZ4)
+    path.write_bytes(path.read_bytes().replace(b"\3\0\0\0lz4", b"\3\0\0\0br9"))
+    with pytest.raises(InputError, match="packed by 'br9', which is not known here: 4 chunks are"):
+        read_bag(path)
+
+
+def test_statistics_that_do_not_count_by_channel_are_compared_in_total(tmp_path: Path) -> None:
+    path = mcap.write(tmp_path / "bag.mcap", mcap.demonstration())
+    data = path.read_bytes()
+    begin = data.rindex(struct.pack("<BQQ", 11, 46 + 20, 40))
+    head = struct.pack("<BQQ", 11, 46 + 20, 50) + data[begin + 17 : begin + 9 + 42]
+    # An attachment is no message, and takes the place of the counts.
+    path.write_bytes(data[:begin] + head + bytes(4 + 20) + data[begin + 9 + 46 + 20 :])
+    read = read_bag(path)
+    assert len(read.demonstration) == 20
+    assert read.notes == ("bag.mcap says that it holds 50 messages, and 40 were found",)
+
+
+@pytest.mark.parametrize("suffix", [".lz4", ".zst", ".zstd"])
+def test_files_packed_with_command_line_tools_are_read(tmp_path: Path, suffix: str) -> None:
+    bag = corpus.bag(tmp_path / "bag", MCAP, None)
+    data = (bag / "bag.mcap").read_bytes()
+    pack = lz4.frame.compress if suffix == ".lz4" else packing._zstd().compress
+    (bag / "bag.mcap").unlink()
+    (bag / f"bag.mcap{suffix}").write_bytes(pack(data))
+    read = _read(bag)
+    assert (len(read.demonstration), read.notes) == (20, ())
+
+
+def test_of_a_packed_file_that_is_cut_off_the_beginning_is_read(tmp_path: Path) -> None:
+    path = mcap.write(tmp_path / "bag.mcap", mcap.demonstration(3000), per_chunk=100)
+    packed = packing._zstd().compress(path.read_bytes())
+    path.unlink()
+    whole = tmp_path / "bag.mcap.zstd"
+    whole.write_bytes(packed[: len(packed) * 9 // 10])
+    read = read_bag(whole)
+    assert 500 < len(read.demonstration) < 3000
+    assert any("bytes could be unpacked" in note for note in read.notes)
+
+
+def test_files_are_missed_by_their_numbers_where_there_is_no_list(tmp_path: Path) -> None:
+    for number in (0, 3):
+        mcap.write(tmp_path / "run" / f"run_{number}.mcap", mcap.demonstration())
+    notes = _read(tmp_path / "run").notes
+    assert "by their numbers, 2 files are not there: run_1, run_2" in notes
+
+
+def test_a_file_that_cannot_be_read_does_not_keep_the_others_from_being_read(
+    tmp_path: Path,
+) -> None:
+    for number in (0, 1):
+        mcap.write(tmp_path / "run" / f"run_{number}.mcap", mcap.demonstration())
+    (tmp_path / "run" / "run_1.mcap").write_bytes(b"version https://git-lfs.github.com/spec/v1\n")
+    read = _read(tmp_path / "run")
+    assert len(read.demonstration) == 20
+    assert any("run_1.mcap cannot be read, and is left out" in note for note in read.notes)
+    assert any("git lfs pull" in note for note in read.notes)
+
+
+def _large_database(path: Path) -> bytes:
+    """A database of 400 messages, one of them longer than a page, with 100 deleted."""
+    connection = sqlite3.connect(path)
+    connection.executescript(
+        "PRAGMA page_size = 512;"
+        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, "
+        "serialization_format TEXT, offered_qos_profiles TEXT);"
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, "
+        "timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
+        "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
+        f"INSERT INTO topics VALUES (1, '/state', '{mcap.STATE}', 'cdr', ''),"
+        f" (2, '/action', '{mcap.ACTION}', 'cdr', '')"
+    )
+    messages = [
+        (one.channel + 1, one.stamp, one.data if one.stamp != 200 else mcap.action("x" * 2000))
+        for one in mcap.demonstration(250)
+    ]
+    connection.executemany(
+        "INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", messages
+    )
+    connection.execute("DELETE FROM messages WHERE id > 400")
+    connection.commit()
+    connection.close()
+    return path.read_bytes()
+
+
+def test_pages_hold_the_messages_that_sqlite_finds(tmp_path: Path) -> None:
+    path = tmp_path / "bag.db3"
+    _large_database(path)
+    with path.open("rb") as file, contextlib.closing(sqlite3.connect(path)) as connection:
+        by_sqlite = connection.execute("SELECT id, topic_id, timestamp, data FROM messages")
+        pages = [
+            (one.number, one.topic, one.stamp, one.data) for one in SqlitePages(file).messages()
+        ]
+        assert sorted(pages) == sorted(by_sqlite.fetchall())
+
+
+with tempfile.TemporaryDirectory() as _directory:
+    _DATABASE = _large_database(Path(_directory, "bag.db3"))
+
+
+@given(st.integers(100, 30_000), st.integers(0, 2000), st.integers(0, 255))
+@settings(deadline=None)
+def test_pages_can_be_anything(begin: int, size: int, byte: int) -> None:
+    data = bytearray(_DATABASE)
+    begin = min(begin, len(data))
+    data[begin : begin + size] = bytes([byte]) * len(data[begin : begin + size])
+    whole = {one.number for one in SqlitePages(io.BytesIO(_DATABASE)).messages()}
+    numbers = [one.number for one in SqlitePages(io.BytesIO(bytes(data))).messages()]
+    assert len(numbers) == len(set(numbers))
+    # A page of 512 bytes has at most 36 rows of 14 bytes.
+    pages = size // 512 + 2
+    assert len(whole - set(numbers)) <= 36 * pages
+
+
+def test_what_a_cut_off_database_still_has_is_read(tmp_path: Path) -> None:
+    data = _large_database(tmp_path / "whole.db3")
+    path = tmp_path / "cut.db3"
+    path.write_bytes(data[: len(data) // 2 + 100])
+    read = read_bag(path)
+    assert 50 < len(read.demonstration) < 200
+    [note] = [one for one in read.notes if "could be read" in one]
+    assert "is damaged (it ends before its end)" in note
+    assert re.search(r"\d+ of at least \d+ messages", note)
+
+
+def test_a_log_that_is_damaged_is_noted(tmp_path: Path) -> None:
+    bag = corpus.bag(tmp_path / "bag", SQLITE, None)
+    _log_of_sqlite(bag, "id > 20")
+    log = bag / "bag.db3-wal"
+    data = bytearray(log.read_bytes())
+    data[:4] = b"\0\0\0\0"
+    log.write_bytes(data)
+    (bag / "metadata.yaml").unlink()
+    notes = _read(bag).notes
+    assert (
+        f"bag.db3 has a write-ahead log of {len(data)} bytes that is damaged: it was not read"
+        in notes
+    )
+
+
+def test_the_pages_of_a_log_that_are_not_complete_are_noted(tmp_path: Path) -> None:
+    bag = corpus.bag(tmp_path / "bag", SQLITE, None)
+    _log_of_sqlite(bag, "id > 20")
+    log = bag / "bag.db3-wal"
+    log.write_bytes(log.read_bytes()[:-10])
+    (bag / "metadata.yaml").unlink()
+    assert any(
+        "pages are not complete or damaged: they were not read" in note for note in _read(bag).notes
+    )

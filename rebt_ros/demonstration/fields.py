@@ -4,6 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from rebt_ros.arrays import FloatArray
+
+#: Numbers as a message has them: of rclpy, or of rosbags.
+Values = TypeVar("Values", Sequence[float], FloatArray)
+
+
+class LayoutMessage(Protocol):
+    """The layout of an array message."""
+
+    dim: Sequence[Any]
+    """Each with a `label` and a `size`."""
+    data_offset: int
+
+
+class ArrayMessage(Protocol[Values]):
+    """std_msgs/Float64MultiArray, of rclpy or of rosbags."""
+
+    layout: LayoutMessage
+    data: Values
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +62,18 @@ def fields_of(dimensions: Sequence[Dimension], count: int) -> tuple[str, ...]:
         return ()
     fields = tuple(name.strip() for name in names)
     return fields if len(fields) == count == len(set(fields)) and all(fields) else ()
+
+
+def values_of(message: ArrayMessage[Values]) -> Values:
+    """The values of an array message, without the padding before them."""
+    offset = message.layout.data_offset
+    return message.data[offset:] if offset else message.data
+
+
+def names_of(message: ArrayMessage[Values]) -> tuple[str, ...]:
+    """The names that its layout gives to the values of an array message; empty where to none."""
+    dimensions = [Dimension(one.label, one.size) for one in message.layout.dim]
+    return fields_of(dimensions, len(values_of(message)))
 
 
 def dimension_labels_of(fields: Sequence[str]) -> tuple[str, ...]:

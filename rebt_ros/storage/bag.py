@@ -7,28 +7,33 @@ receives, so that the same messages give the same rows.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from struct import Struct
-from typing import Protocol, cast
+from textwrap import shorten
+from typing import Final, Protocol, cast
 
 from rosbags.typesys import Stores, get_typestore
 
 from rebt_ros.arrays import FloatArray
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, Fault, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
-from rebt_ros.demonstration.fields import Dimension, fields_of
+from rebt_ros.demonstration.fields import ArrayMessage, names_of, values_of
 from rebt_ros.errors import InputError
 from rebt_ros.storage.account import Account
-from rebt_ros.storage.bag_files import BagFiles, Topic, explained, opened_bag
+from rebt_ros.storage.bag_files import GAP, BagFiles, Topic, explained, opened_bag
 from rebt_ros.storage.bag_safety import check_expansion, expansion
 from rebt_ros.storage.packing import ZSTD_MAGIC, unzstd
 from rebt_ros.storage.read import Read
 
 STATE_TYPE = "std_msgs/msg/Float64MultiArray"
 ACTION_TYPE = "std_msgs/msg/String"
+
+#: Longest list of topics in a sentence (characters).
+_LONGEST_LIST: Final = 500
 
 #: Later than any clock tells (nanoseconds): stamps are signed 64-bit numbers.
 _LATEST = 2**63
@@ -62,12 +67,13 @@ def read_bag(
         OptionError: A topic is named twice, or the sample rate is not positive.
     """
     with opened_bag(path) as bag:
-        kinds = _topics(bag)
-        if not any(kinds.values()):
-            raise InputError(f"{path} holds no messages: record state and action topics first.")
         names = [one.name for one in state_topics]
-        states = _chosen(path, kinds, names, STATE_TYPE, "state")
-        actions = _chosen(path, kinds, action_topics, ACTION_TYPE, "action")
+        with _with_notes(bag):
+            kinds = _topics(bag)
+            if not kinds:
+                raise InputError(f"{path} holds no messages: record state and action topics first.")
+            states = _chosen(path, kinds, names, STATE_TYPE, "state")
+            actions = _chosen(path, kinds, action_topics, ACTION_TYPE, "action")
         topics = (
             [replace(one, name=name) for one, name in zip(state_topics, states, strict=True)]
             if state_topics
@@ -75,11 +81,14 @@ def read_bag(
         )
         builder = DemonstrationBuilder(topics, actions, sample_rate)
         wanted = {*((one, STATE_TYPE) for one in states), *((one, ACTION_TYPE) for one in actions)}
-        feed = _Feed(path, builder, skip_bad)
+        feed = _Feed(
+            path, builder, skip_bad, {name: bag.found[name, STATE_TYPE] for name in states}
+        )
         rows = (row for message in _messages(path, bag, wanted) for row in feed.rows_of(*message))
         first = next(rows, None)
         if first is None or builder.features is None:
-            raise InputError(f"{path} gives no rows: {feed.why_no_rows(states, actions)}.")
+            with _with_notes(bag):
+                raise InputError(f"{path} gives no rows: {feed.why_no_rows(states, actions)}.")
         demonstration = Demonstration.from_rows(
             path.absolute().name,
             builder.features,
@@ -98,17 +107,32 @@ class _Feed:
     path: Path
     builder: DemonstrationBuilder
     skip_bad: bool
+    there: Mapping[str, int]
+    """Messages by state topic, of those that can be read."""
     states: _States = field(default_factory=lambda: _States())
     seen: Counter[str] = field(default_factory=Counter)
     """Messages by topic."""
     early: int = 0
     """Actions before the first state."""
+    stale: int = 0
+    """Actions after missing messages and before the next states."""
+    unknown: set[str] = field(default_factory=set)
+    """State topics whose last message may be missing."""
     bad: list[str] = field(default_factory=list)
     """What was wrong with the messages that were left out."""
 
     def rows_of(self, topic: Topic, stamp: int, data: bytes) -> tuple[Row, ...]:
+        if topic == GAP:
+            # A topic on which nothing more comes still has its value, as far as can be known.
+            self.unknown = {name for name, count in self.there.items() if self.seen[name] < count}
+            return ()
         name, kind = topic
         self.seen[name] += 1
+        if kind == STATE_TYPE:
+            self.unknown.discard(name)
+        elif self.unknown:
+            self.stale += 1
+            return ()
         try:
             return self._pushed(topic, stamp, data)
         except BadMessageError as err:
@@ -122,6 +146,9 @@ class _Feed:
                 f"{self.path}, message {self.seen[name]} on {name!r} cannot be decoded as "
                 f"{kind}: record the topic again."
             )
+            problem.__cause__ = err
+        except _TooLargeError as err:
+            problem = InputError(f"{self.path}, message {self.seen[name]} on {name!r}: {err}")
             problem.__cause__ = err
         except _LateError:
             problem = InputError(
@@ -140,6 +167,7 @@ class _Feed:
             BadMessageError: The builder refuses it.
             _UndecodableError: It cannot be decoded.
             _LateError: Its stamp is too large.
+            _TooLargeError: It could unpack to too much.
         """
         name, kind = topic
         if stamp >= _LATEST:
@@ -152,11 +180,15 @@ class _Feed:
         return self.builder.observe(stamp, name, values, labels)
 
     def account(self, stated: int, demonstration: Demonstration) -> Account:
-        left_out = {"came before the first state": self.early, "cannot be used": len(self.bad)}
+        left_out = {
+            "came before the first state": self.early,
+            "came after missing messages, before the next state": self.stale,
+            "cannot be used": len(self.bad),
+        }
         return Account(
             "messages",
             stated,
-            self.seen.total() - self.early - len(self.bad),
+            self.seen.total() - self.early - self.stale - len(self.bad),
             len(demonstration),
             {reason: count for reason, count in left_out.items() if count},
         )
@@ -167,6 +199,11 @@ class _Feed:
             notes.append(
                 f"left out: {_counted(self.early, 'action')} before the first message of every "
                 "state topic"
+            )
+        if self.stale:
+            notes.append(
+                f"left out: {_counted(self.stale, 'action')} after messages that are missing, "
+                "whose state is not known"
             )
         if self.bad:
             notes.append(
@@ -192,23 +229,12 @@ class _UndecodableError(Exception):
     """The bytes of a message are not one of its type."""
 
 
+class _TooLargeError(Exception):
+    """A message could unpack to too much."""
+
+
 class _LateError(Exception):
     """The stamp of a message is later than any clock tells."""
-
-
-class _Dimension(Protocol):
-    label: str
-    size: int
-
-
-class _Layout(Protocol):
-    dim: Sequence[_Dimension]
-    data_offset: int
-
-
-class _Float64MultiArray(Protocol):
-    layout: _Layout
-    data: FloatArray
 
 
 class _String(Protocol):
@@ -259,10 +285,8 @@ class _States:
         head = self._heads.get(len(data))
         if head is not None and data.startswith(head.data):
             return head.numbers.unpack_from(data, len(head.data)), head.labels
-        message = cast(_Float64MultiArray, _decoded(data, STATE_TYPE))
-        values = message.data[message.layout.data_offset :]
-        dimensions = [Dimension(one.label, one.size) for one in message.layout.dim]
-        labels = fields_of(dimensions, len(values))
+        message = cast("ArrayMessage[FloatArray]", _decoded(data, STATE_TYPE))
+        values, labels = values_of(message), names_of(message)
         self._remember(data, values, labels)
         return tuple(values.tolist()), labels
 
@@ -275,14 +299,34 @@ class _States:
 
 
 def _unpacked(data: bytes) -> bytes:
-    """A message without the compression of single messages; no message begins like that."""
+    """A message without the compression of single messages; no message begins like that.
+
+    Raises:
+        _TooLargeError: It could unpack to too much.
+        _UndecodableError: It cannot be unpacked.
+    """
     if not data.startswith(ZSTD_MAGIC):
         return data
-    check_expansion(Path("a message"), expansion(data), len(data))
+    try:
+        check_expansion("it", expansion(data), len(data))
+    except InputError as err:
+        raise _TooLargeError(str(err)) from err
     try:
         return unzstd(data)
     except Exception as err:
         raise _UndecodableError(str(err)) from err
+
+
+@contextmanager
+def _with_notes(bag: BagFiles) -> Iterator[None]:
+    """Adds to a refusal what is wrong with the files, which may be its reason."""
+    try:
+        yield
+    except InputError as err:
+        if not bag.notes:
+            raise
+        told = shorten("; ".join(bag.notes), _LONGEST_LIST, placeholder=" ...")
+        raise InputError(f"{str(err).rstrip('.')} ({told}).") from err
 
 
 def _messages(path: Path, bag: BagFiles, wanted: set[Topic]) -> Iterator[tuple[Topic, int, bytes]]:
@@ -294,7 +338,11 @@ def _differences(bag: BagFiles, wanted: set[Topic]) -> Iterator[str]:
     """Notes of what the account, which is about all topics together, does not tell."""
     for name in sorted({name for name, _ in wanted}):
         if count := bag.others_found[name]:
-            yield f"left out: messages on {name} that are {bag.others[name]}: {count}"
+            yield f"left out: {bag.others[name]} messages on {name}: {count}"
+        for topic in sorted(bag.found.keys() - wanted):
+            if topic[0] == name and (count := bag.found[topic]):
+                kind = topic[1] or "unknown"
+                yield f"left out: messages on {name} of type {kind}: {count}"
     told = {topic: bag.stated.get(topic, bag.found[topic]) for topic in sorted(wanted)}
     if sum(told.values()) == sum(bag.found[topic] for topic in told):
         for topic, stated in told.items():
@@ -305,21 +353,23 @@ def _differences(bag: BagFiles, wanted: set[Topic]) -> Iterator[str]:
                 )
 
 
-def _topics(bag: BagFiles) -> dict[str, str]:
-    """Type of each topic that has messages, or their encoding; empty where types differ."""
-    kinds: dict[str, str] = {name: f"{encoding} messages" for name, encoding in bag.others.items()}
-    several = Counter(name for (name, _), count in bag.found.items() if count)
+def _topics(bag: BagFiles) -> dict[str, dict[str, int]]:
+    """Messages of each topic that has some, by their type, or by their encoding."""
+    kinds: dict[str, dict[str, int]] = {}
     for (name, kind), count in sorted(bag.found.items()):
         if count:
-            kinds[name] = kind if several[name] == 1 else ""
+            kinds.setdefault(name, {})[kind or "unknown"] = count
+    for name, encoding in sorted(bag.others.items()):
+        if count := bag.others_found[name]:
+            kinds.setdefault(name, {})[f"{encoding} messages"] = count
     return kinds
 
 
 def _chosen(
-    path: Path, kinds: dict[str, str], names: Sequence[str], kind: str, role: str
+    path: Path, kinds: dict[str, dict[str, int]], names: Sequence[str], kind: str, role: str
 ) -> tuple[str, ...]:
     """The topics to read, by the names that the bag gives them."""
-    candidates = [topic for topic, its in kinds.items() if its == kind]
+    candidates = [topic for topic, its in kinds.items() if kind in its]
     if not names and len(candidates) == 1:
         return (candidates[0],)
     if not names and candidates:
@@ -327,18 +377,22 @@ def _chosen(
             f"{path} has {len(candidates)} topics of type {kind} ({', '.join(candidates)}): "
             f"say which of them is the {role} topic."
         )
-    there = ", ".join(f"{topic} ({its or 'several types'})" for topic, its in kinds.items())
+    there = shorten(
+        ", ".join(f"{topic} ({', '.join(its)})" for topic, its in kinds.items()),
+        _LONGEST_LIST,
+        placeholder=" ...",
+    )
     if not names:
         raise InputError(
             f"{path} has no {role} topic: record one of type {kind}; there is {there}."
         )
-    by_name = {topic.lstrip("/"): topic for topic in kinds}
+    by_name = {topic.lstrip("/"): topic for topic in kinds} | {topic: topic for topic in kinds}
     topics = []
     for name in names:
-        topic = by_name.get(name.lstrip("/"))
+        topic = by_name.get(name) or by_name.get(name.lstrip("/"))
         if topic is None:
             raise InputError(f"{path} has no messages on {role} topic {name!r}: there is {there}.")
-        if kinds[topic] != kind:
+        if kind not in kinds[topic]:
             raise InputError(
                 f"{path}: {role} topic {name!r} must be of type {kind}: there is {there}."
             )

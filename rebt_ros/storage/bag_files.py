@@ -7,29 +7,33 @@ so that a bag is read whose recorder was killed before it wrote all down.
 from __future__ import annotations
 
 import contextlib
+import errno
+import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 from textwrap import shorten
 from typing import Final, TypeAlias
 
 from rebt_ros.errors import InputError, RebtError
-from rebt_ros.storage import bag_metadata, sqlite
+from rebt_ros.storage import bag_metadata, mcap, sqlite
 from rebt_ros.storage.bag_safety import check_bag
 from rebt_ros.storage.mcap import MAGIC as MCAP_MAGIC
-from rebt_ros.storage.mcap import McapFile
-from rebt_ros.storage.packing import unzstd_file
+from rebt_ros.storage.mcap import McapFile, Survey
+from rebt_ros.storage.packing import unpack_file, without_packing
 from rebt_ros.storage.text import unreadable
 
 #: Suffixes of files that hold a bag's messages, in lower case.
 STORAGE_SUFFIXES: Final = (".mcap", ".db3")
-PACKED: Final = ".zstd"
 
 _CDR: Final = "cdr"
+_NUMBERED: Final = re.compile(r"(.+)_([0-9]{1,6})\.\w.*")
+#: A recording of a day that is split each minute has 1440 files.
+_MOST_FILES: Final = 10_000
 
 #: A topic with the type of its messages.
 Topic: TypeAlias = tuple[str, str]
@@ -37,10 +41,13 @@ Topic: TypeAlias = tuple[str, str]
 Message: TypeAlias = tuple[Topic, int, bytes]
 
 
+#: The topic of what stands for messages that are missing.
+GAP: Final[Topic] = ("", "")
+
+
 def holds_messages(path: Path) -> bool:
     """Whether the name is that of a file of a bag's messages, packed or not."""
-    name = path.name.lower().removesuffix(PACKED)
-    return name.endswith(STORAGE_SUFFIXES)
+    return without_packing(path.name.lower()).endswith(STORAGE_SUFFIXES)
 
 
 def is_bag(directory: Path) -> bool:
@@ -62,13 +69,27 @@ class BagFiles:
     """How many the bag says that there are; only where it does."""
     notes: list[str] = field(default_factory=list)
     """What a person must know; no full stops."""
+    is_incomplete: bool = False
+    """Whether messages are missing inside of a file, or between two of them."""
     _readers: list[Callable[[Collection[Topic]], Iterator[Message]]] = field(default_factory=list)
 
     def messages(self, topics: Collection[Topic]) -> Iterator[Message]:
-        """The messages by the time at which they were recorded; of one instant, as they stand."""
-        parts = (message for read in self._readers for message in read(topics))
+        """The messages by the time at which they were recorded; of one instant, as they stand.
+
+        Among them are messages of the topic `GAP` where others are missing.
+        """
+        parts = self._parts(topics)
         # Where the recorder went from one file to the next their times may overlap.
         return iter(sorted(parts, key=itemgetter(1))) if len(self._readers) > 1 else parts
+
+    def _parts(self, topics: Collection[Topic]) -> Iterator[Message]:
+        for number, read in enumerate(self._readers):
+            is_gap = number > 0 and self.is_incomplete
+            for message in read(topics):
+                if is_gap:
+                    yield GAP, message[1], b""
+                    is_gap = False
+                yield message
 
     def add(
         self,
@@ -99,9 +120,14 @@ def opened_bag(path: Path) -> Iterator[BagFiles]:
         with explained(path):
             check_bag(path, bag_metadata.NAME)
             metadata = _metadata(path, bag.notes) if path.is_dir() else None
-            files = _files(path, metadata, bag.notes) if path.is_dir() else [path]
-            for file in files:
-                _open(file, bag, stack)
+            if path.is_dir():
+                files = _files(path, metadata, bag.notes)
+                # Whatever is noted about files, some may be missing between others.
+                bag.is_incomplete = bool(bag.notes)
+                _open_all(files, bag, stack)
+            else:
+                # SQLite's log is beside the file that a link leads to.
+                _open(path.resolve(), bag, stack)
         if metadata is not None:
             # A recorder that was killed has counted nothing.
             bag.stated |= {topic: count for topic, count in metadata.counts.items() if count > 0}
@@ -117,7 +143,22 @@ def _metadata(directory: Path, notes: list[str]) -> bag_metadata.BagMetadata | N
         return None
     if metadata is None and len(list(filter(holds_messages, directory.iterdir()))) > 1:
         notes.append(f"there is no {bag_metadata.NAME}: all files of messages are read as one bag")
+    if metadata is None:
+        notes += _gaps_in_numbers(directory)
     return metadata
+
+
+def _gaps_in_numbers(directory: Path) -> Iterator[str]:
+    """Notes which files are not there by the numbers that recorders give to them, from 0."""
+    numbers: dict[str, set[int]] = {}
+    for one in filter(holds_messages, directory.iterdir()):
+        if found := _NUMBERED.fullmatch(one.name):
+            numbers.setdefault(found[1], set()).add(int(found[2]))
+    for base, there in sorted(numbers.items()):
+        missing = [number for number in range(min(max(there), _MOST_FILES)) if number not in there]
+        if missing:
+            listed = shorten(", ".join(f"{base}_{number}" for number in missing), 200)
+            yield f"by their numbers, {len(missing)} files are not there: {listed}"
 
 
 def _files(
@@ -126,7 +167,7 @@ def _files(
     """The files of messages, those that are listed first; notes what differs from the list."""
     there = sorted(one for one in directory.iterdir() if holds_messages(one) and one.is_file())
     plain = {one.name for one in there}
-    twice = [one for one in there if one.name.lower().endswith(PACKED) and one.stem in plain]
+    twice = [one for one in there if without_packing(one.name) in plain - {one.name}]
     files = [one for one in there if one not in twice]
     if metadata is None:
         if not files:
@@ -135,8 +176,8 @@ def _files(
             )
         return files
     listed = {name: place for place, name in enumerate(metadata.files)}
-    known = {_plain(name) for name in listed}
-    missing = sorted(known - {_plain(one.name) for one in files})
+    known = {without_packing(name) for name in listed}
+    missing = sorted(known - {without_packing(one.name) for one in files})
     if missing and not files:
         raise InputError(
             f"{directory} lacks the files that its {bag_metadata.NAME} lists "
@@ -145,27 +186,51 @@ def _files(
     for name in missing:
         notes.append(f"{name} is listed in {bag_metadata.NAME} and not there: it was not read")
     for one in files:
-        if _plain(one.name) not in known:
+        if without_packing(one.name) not in known:
             notes.append(f"{one.name} is not listed in {bag_metadata.NAME}: it is read as well")
     return sorted(files, key=lambda one: (listed.get(one.name, len(listed)), one.name))
 
 
-def _plain(name: str) -> str:
-    return name[: -len(PACKED)] if name.lower().endswith(PACKED) else name
+def _open_all(files: Sequence[Path], bag: BagFiles, stack: ExitStack) -> None:
+    """Opens the files that can be opened; notes which cannot.
+
+    Raises:
+        Exception: What the last one raised, where none can.
+    """
+    failures = 0
+    for file in files:
+        try:
+            _open(file, bag, stack)
+        except Exception as err:
+            failures += 1
+            if failures == len(files):
+                raise
+            bag.is_incomplete = True
+            bag.notes.append(f"{file.name} cannot be read, and is left out: {_reason(err)}")
 
 
 def _open(file: Path, bag: BagFiles, stack: ExitStack) -> None:
-    if file.name.lower().endswith(PACKED):
-        directory = stack.enter_context(TemporaryDirectory())
-        unpacked = Path(directory, file.stem)
-        unzstd_file(file, unpacked)
-        check_bag(unpacked, bag_metadata.NAME)
-        _open_plain(unpacked, file.name, bag, stack)
-    else:
+    plain = without_packing(file.name)
+    if plain == file.name:
         _open_plain(file, file.name, bag, stack)
+        return
+    directory = stack.enter_context(TemporaryDirectory())
+    unpacked = Path(directory, plain)
+    if why := unpack_file(file, unpacked):
+        size = unpacked.stat().st_size
+        bag.notes.append(
+            f"{file.name} is damaged: its first {size} bytes could be unpacked ({_shortened(why)})"
+        )
+    check_bag(unpacked, bag_metadata.NAME)
+    _open_plain(unpacked, file.name, bag, stack)
 
 
 def _open_plain(file: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
+    if not file.stat().st_size:
+        # A recorder that was killed at once leaves one.
+        bag.notes.append(f"{name} is empty")
+        return
+    refuse_strangers(file)
     with file.open("rb") as opened:
         magic = opened.read(len(sqlite.MAGIC))
     if magic.startswith(MCAP_MAGIC):
@@ -182,13 +247,14 @@ def _open_mcap(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
     number = {}
     for channel, about in survey.channels.items():
         if about.encoding == _CDR:
-            number[channel] = (about.topic, about.kind)
+            number[channel] = (about.topic, _full(about.kind))
         else:
             bag.others[about.topic] = about.encoding or "unknown"
             bag.others_found[about.topic] += survey.found[channel]
 
     def read(topics: Collection[Topic]) -> Iterator[Message]:
         wanted = {channel: topic for channel, topic in number.items() if topic in topics}
+        wanted[mcap.GAP] = GAP
         for message in file.messages(wanted.keys()):
             yield wanted[message.channel], message.stamp, message.data
 
@@ -197,42 +263,71 @@ def _open_mcap(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
         counts[topic] += survey.found[channel]
         stated[topic] += survey.stated_of(channel)
     bag.add(counts, stated, read)
-    if not survey.is_complete:
-        bag.notes.append(
-            f"{name} ends before its end, as where a recorder was killed: what is whole was read"
-        )
-    if survey.damaged:
-        chunks = "chunk is" if survey.damaged == 1 else "chunks are"
-        bag.notes.append(f"{name} is damaged: {survey.damaged} {chunks} left out")
-    if survey.cut:
-        chunks = "chunk ends" if survey.cut == 1 else "chunks end"
-        bag.notes.append(
-            f"{name} is damaged: {survey.cut} {chunks} inside of a message: what is whole was read"
-        )
+    problems = tuple(_problems(survey))
+    bag.is_incomplete |= bool(problems)
+    bag.notes += (f"{name} {note}" for note in problems)
     _note_undeclared(survey.undeclared, name, bag)
 
 
+def _full(kind: str) -> str:
+    """The name of a type with the `msg` in its middle, which some recorders leave out."""
+    package, _, name = kind.partition("/")
+    return f"{package}/msg/{name}" if name and "/" not in name else kind
+
+
+def _problems(survey: Survey) -> Iterator[str]:
+    """What is wrong with an mcap file, in words that follow its name."""
+    if survey.gaps:
+        lost = sum(following - begin for begin, following in survey.gaps)
+        yield (
+            f"is damaged from byte {survey.gaps[0][0]} on: {lost} bytes are no records, and were "
+            "not read"
+        )
+    elif not survey.is_complete:
+        yield "ends before its end, as where a recorder was killed: what is whole was read"
+    if survey.damaged:
+        yield f"is damaged: {_counted(survey.damaged, 'chunk is', 'chunks are')} left out"
+    if survey.cut:
+        which = _counted(len(survey.cut), "chunk ends", "chunks end")
+        yield f"is damaged: {which} inside of a message: what is whole was read"
+    for compression, count in sorted(survey.packed_by.items()):
+        which = _counted(count, "chunk is", "chunks are")
+        yield f"is packed by {compression!r}, which is not known here: {which} left out"
+    found = survey.found.total()
+    if survey.total is not None and survey.total != found:
+        yield f"says that it holds {survey.total} messages, and {found} were found"
+
+
+def _counted(count: int, singular: str, plural: str) -> str:
+    return f"{count} {singular if count == 1 else plural}"
+
+
 def _open_sqlite(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
-    connection = stack.enter_context(sqlite.opened(path))
-    topics = {
-        one.number: (one.name, one.kind)
-        for one in sqlite.topics(connection)
-        if one.encoding == _CDR or bag.others.setdefault(one.name, one.encoding) == _CDR
-    }
+    file = stack.enter_context(sqlite.opened(path))
+    topics: dict[int, Topic] = {}
+    for one in file.topics:
+        if one.encoding == _CDR:
+            topics[one.number] = (one.name, one.kind)
+        else:
+            bag.others[one.name] = one.encoding or "unknown"
+            bag.others_found[one.name] += file.found[one.number]
 
     def read(wanted: Collection[Topic]) -> Iterator[Message]:
-        numbers = [number for number, topic in topics.items() if topic in wanted]
-        for number, stamp, data in sqlite.messages(connection, numbers):
-            yield topics[number], stamp, data
+        known = len(file.notes)
+        for number, stamp, data in file.messages(
+            [number for number, topic in topics.items() if topic in wanted]
+        ):
+            yield GAP if number == sqlite.GAP else topics[number], stamp, data
+        bag.is_incomplete |= file.is_damaged
+        bag.notes.extend(f"{name} {note}" for note in file.notes[known:])
 
     counts = Counter[Topic]()
-    for one in sqlite.topics(connection):
-        if one.number in topics:
-            counts[topics[one.number]] += one.messages
-        else:
-            bag.others_found[one.name] += one.messages
+    for number, topic in topics.items():
+        counts[topic] += file.found[number]
     bag.add(counts, {}, read)
-    _note_undeclared(sqlite.undeclared(connection), name, bag)
+    bag.is_incomplete |= bool(file.notes)
+    bag.notes += (f"{name} {note}" for note in file.notes)
+    _note_undeclared(file.undeclared, name, bag)
 
 
 def _note_undeclared(count: int, name: str, bag: BagFiles) -> None:
@@ -261,6 +356,10 @@ _STRANGERS: Final[Sequence[tuple[bytes, str]]] = (
         b"#ROSBAG V",
         "is a bag of ROS 1: convert it with `rosbags-convert --src FILE --dst DIRECTORY`",
     ),
+    (b"\x1f\x8b", "is packed with gzip: unpack it with `gunzip`"),
+    (b"PK\x03\x04", "is a zip archive: unpack it with `unzip`"),
+    (b"<!DOCTYPE", "is a page of HTML, as a failed download leaves it: download the file itself"),
+    (b"<html", "is a page of HTML, as a failed download leaves it: download the file itself"),
 )
 
 
@@ -288,5 +387,22 @@ def _explanation(path: Path, err: Exception) -> InputError:
             f"{path} cannot be read without the package {err.name}, which rosbags brings: "
             "install rosbags with pip."
         )
-    reason = shorten(str(err), 200).rstrip(".") or type(err).__name__
-    return InputError(f"{path} is damaged or not a bag ({reason}): record it again.")
+    if isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT):
+        return InputError(
+            f"{path} must be unpacked or copied to be read, and there is no room: make room in "
+            f"{gettempdir()}, or name another place in TMPDIR."
+        )
+    if isinstance(err, OSError) and err.errno is not None:
+        return unreadable(path, err)
+    return InputError(
+        f"{path} is damaged or not a bag ({_reason(err)}): copy it again from where it was "
+        "recorded, or record it again."
+    )
+
+
+def _reason(err: Exception) -> str:
+    return _shortened(str(err)) or type(err).__name__
+
+
+def _shortened(text: str) -> str:
+    return shorten(text, 200).rstrip(".")

@@ -17,15 +17,22 @@ from typing import BinaryIO, Final
 
 from rebt_ros.errors import InputError
 from rebt_ros.storage.mcap import MAGIC, packed_chunks
+from rebt_ros.storage.packing import LZ4_MAGIC, ZSTD_MAGIC
 
-#: What compressed data may unpack to: this much in any case, and this many times their own size.
+#: What a message or chunk may unpack to in any case (bytes): the largest real ones are a
+#: chunk of 4 MB, as rosbag2 makes them, and a point cloud of 1,000,000 points (32 MB).
 LARGEST_EXPANSION: Final = 64 << 20
+#: The same of a whole file (bytes): a costmap of 1000 x 1000 cells that hardly changes, at 2 Hz for
+#: a minute, is 120 MB that pack to next to nothing.
+LARGEST_FILE: Final = 256 << 20
+#: How many times their own size data may unpack to where that is more: images of a simulated camera
+#: without noise pack to a hundredth.
 LARGEST_RATIO: Final = 200
 
-_ZSTD: Final = 0xFD2FB528
-_ZSTD_SKIPPABLE: Final = range(0x184D2A50, 0x184D2A60)
+_ZSTD: Final = int.from_bytes(ZSTD_MAGIC, "little")
+_SKIPPABLE: Final = range(0x184D2A50, 0x184D2A60)
 _ZSTD_BLOCK: Final = 128 << 10
-_LZ4: Final = 0x184D2204
+_LZ4: Final = int.from_bytes(LZ4_MAGIC, "little")
 #: Most that a byte of lz4 stands for.
 _LZ4_RATIO: Final = 255
 
@@ -43,7 +50,8 @@ def check_bag(path: Path, metadata: str) -> None:
         OSError: It cannot be read.
     """
     if not path.is_dir():
-        _check_file(path, path.parent)
+        # A link that is named leads where its user wants.
+        _check_file(path.resolve(), path.resolve().parent)
         return
     for one in sorted(path.iterdir()):
         if one.name == metadata:
@@ -57,21 +65,24 @@ def expansion(data: bytes) -> int:
     return _zstd_bound(io.BytesIO(data), len(data))
 
 
-def check_expansion(path: Path, unpacked: int, size: int) -> None:
+def check_expansion(what: str, unpacked: int, size: int, least: int = LARGEST_EXPANSION) -> None:
     """Refuses data that unpack to too much.
 
     Args:
-        path: The bag.
+        what: Its name, as a sentence begins.
         unpacked: The most that they can unpack to, in bytes.
         size: Their own size, in bytes.
+        least: What they may unpack to in any case, in bytes.
 
     Raises:
         InputError: It is too much.
     """
-    if unpacked > max(LARGEST_EXPANSION, LARGEST_RATIO * size):
+    most = max(least, LARGEST_RATIO * size)
+    if unpacked > most:
         raise InputError(
-            f"{path} has {size} bytes that could unpack to {unpacked}, more than {LARGEST_RATIO} "
-            "times as much: record it again without compression."
+            f"{what} has {size} bytes that could unpack to {unpacked}, and at most {most} are "
+            "read: if you trust it, unpack it first (a file with `zstd -d`, chunks with "
+            "`mcap decompress`), or record it again without compression."
         )
 
 
@@ -82,12 +93,14 @@ def _check_file(file: Path, directory: Path) -> None:
         size = os.fstat(opened.fileno()).st_size
         opened.seek(0)
         if magic == MAGIC:
-            unpacked = _mcap_bound(opened)
-        elif int.from_bytes(magic[:4], "little") == _ZSTD:
+            unpacked = _mcap_bound(file, opened)
+        elif magic.startswith(ZSTD_MAGIC):
             unpacked = _zstd_bound(opened, size)
+        elif magic.startswith(LZ4_MAGIC):
+            unpacked = _lz4_bound(opened, size)
         else:
             unpacked = 0
-    check_expansion(file, unpacked, size)
+    check_expansion(str(file), unpacked, size, LARGEST_FILE)
 
 
 def _check_place(file: Path, directory: Path) -> None:
@@ -106,7 +119,7 @@ def _zstd_bound(file: BinaryIO, end: int) -> int:
     with contextlib.suppress(struct.error, IndexError):
         while file.tell() < end:
             (magic,) = struct.unpack("<I", file.read(4))
-            if magic in _ZSTD_SKIPPABLE:
+            if magic in _SKIPPABLE:
                 file.seek(struct.unpack("<I", file.read(4))[0], os.SEEK_CUR)
                 continue
             if magic != _ZSTD:
@@ -126,32 +139,41 @@ def _zstd_bound(file: BinaryIO, end: int) -> int:
     return total
 
 
-def _lz4_bound(file: BinaryIO) -> int:
-    """The most that an lz4 frame can unpack to."""
+def _lz4_bound(file: BinaryIO, end: int) -> int:
+    """The most that lz4 frames up to a position can unpack to; reads the heads of blocks only."""
     total = 0
     with contextlib.suppress(struct.error):
-        magic, flags, block = struct.unpack("<IBB", file.read(6))
-        if magic != _LZ4:
-            return 0
-        largest = 1 << (8 + 2 * (block >> 4 & 7))
-        file.seek(8 * (flags >> 3 & 1) + 4 * (flags & 1) + 1, os.SEEK_CUR)
-        while True:
-            (head,) = struct.unpack("<I", file.read(4))
-            size = head & 0x7FFFFFFF
-            if not size:
+        while file.tell() < end:
+            (magic,) = struct.unpack("<I", file.read(4))
+            if magic in _SKIPPABLE:
+                file.seek(struct.unpack("<I", file.read(4))[0], os.SEEK_CUR)
+                continue
+            if magic != _LZ4:
                 break
-            total += size if head >> 31 else min(largest, _LZ4_RATIO * size)
-            file.seek(size + 4 * (flags >> 4 & 1), os.SEEK_CUR)
+            flags, block = struct.unpack("<BB", file.read(2))
+            largest = 1 << (8 + 2 * (block >> 4 & 7))
+            file.seek(8 * (flags >> 3 & 1) + 4 * (flags & 1) + 1, os.SEEK_CUR)
+            while head := struct.unpack("<I", file.read(4))[0]:
+                size = head & 0x7FFFFFFF
+                total += size if head >> 31 else min(largest, _LZ4_RATIO * size)
+                file.seek(size + 4 * (flags >> 4 & 1), os.SEEK_CUR)
+            file.seek(4 * (flags >> 2 & 1), os.SEEK_CUR)
     return total
 
 
-def _mcap_bound(file: BinaryIO) -> int:
-    """The most that the chunks of an mcap file can unpack to."""
+def _mcap_bound(path: Path, file: BinaryIO) -> int:
+    """The most that the chunks of an mcap file can unpack to.
+
+    Raises:
+        InputError: One of them alone unpacks to too much.
+    """
     total = 0
     for compression, place, length in packed_chunks(file):
         file.seek(place)
         if compression == "zstd":
-            total += _zstd_bound(file, place + length)
+            unpacked = _zstd_bound(file, place + length)
         else:
-            total += _lz4_bound(file) if compression == "lz4" else length
+            unpacked = _lz4_bound(file, place + length) if compression == "lz4" else length
+        check_expansion(str(path), unpacked, length)
+        total += unpacked
     return total

@@ -11,21 +11,34 @@ import contextlib
 import os
 import struct
 import zlib
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import BinaryIO, Final
 
 from rebt_ros.storage.packing import unlz4, unzstd
 
+#: Channel of what stands for messages that are missing.
+GAP: Final = -1
+
 MAGIC: Final = b"\x89MCAP0\r\n"
 
-_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX, _STATISTICS = 2, 3, 4, 5, 6, 7, 11
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX, _CHUNK_INDEX, _STATISTICS = *range(2, 9), 11
+#: What stands where no record does.
+_NO_RECORD: Final = -1
+#: Records of kinds from here on are a program's own.
+_PRIVATE: Final = 0x80
+_KINDS: Final = frozenset({*range(1, 16), *range(_PRIVATE, 0x100)})
 #: Channel, sequence, log time, publish time: before the data of a message.
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 _RECORD_HEAD: Final = struct.Struct("<BQ")
 _INDEX_HEAD: Final = struct.Struct("<HI")
+#: First and last stamp of a chunk, and its place.
+_CHUNK_INDEX_HEAD: Final = struct.Struct("<QQQ")
+#: Where the summary begins, where its offsets begin, and a checksum: the content of a footer.
+_FOOTER_CONTENT: Final = struct.Struct("<QQI")
+_FOOTER_SIZE: Final = _RECORD_HEAD.size + _FOOTER_CONTENT.size
 #: Stamp and place of one message in an index (bytes).
 _INDEX_ENTRY: Final = 16
 #: Records outside of chunks are handled in parts of about this size (bytes).
@@ -71,10 +84,16 @@ class Survey:
     """The same as the file's statistics say it; None where there are none."""
     indexed: Counter[int] = field(default_factory=Counter)
     """The same as the indexes of chunks say it; chunks may lack theirs."""
+    total: int | None = None
+    """Messages as the statistics count them where they do so for all channels together only."""
     damaged: int = 0
     """Chunks that cannot be unpacked."""
-    cut: int = 0
-    """Chunks that end inside of a record."""
+    packed_by: Counter[str] = field(default_factory=Counter)
+    """Chunks by the compression of theirs that is not known here."""
+    gaps: list[tuple[int, int]] = field(default_factory=list)
+    """Where there are no records amid the file: places of the first byte and of the next record."""
+    cut: set[int] = field(default_factory=set)
+    """Numbers of the parts that end inside of a record."""
     is_complete: bool = False
     """Whether the file has its end."""
     in_order: bool = True
@@ -105,14 +124,36 @@ class McapFile:
         self.survey = self._surveyed()
 
     def messages(self, channels: Collection[int]) -> Iterator[McapMessage]:
-        """The messages of some channels by the time at which they were recorded."""
+        """The messages of some channels by the time at which they were recorded.
+
+        Among them are messages of the channel `GAP` where others are missing.
+        """
         wanted = frozenset(channels)
-        parts = (self._of(part, wanted) for part in self._parts())
         if self.survey.in_order:
-            for part in parts:
-                yield from sorted(part, key=_stamp)
-        else:
-            yield from sorted((one for part in parts for one in part), key=_stamp)
+            latest = 0
+            for part in self._parts_of(wanted):
+                if part is None:
+                    yield McapMessage(GAP, latest, b"")
+                elif part:
+                    found = sorted(part, key=_stamp)
+                    latest = found[-1].stamp
+                    yield from found
+            return
+        everything: list[McapMessage] = []
+        is_gap = False
+        for part in self._parts_of(wanted):
+            if part and is_gap:
+                everything.append(McapMessage(GAP, part[0].stamp, b""))
+            is_gap = part is None or (is_gap and not part)
+            everything += part or ()
+        yield from sorted(everything, key=_stamp)
+
+    def _parts_of(self, wanted: frozenset[int]) -> Iterator[list[McapMessage] | None]:
+        """The messages of some channels in each part; None where some are missing."""
+        for number, part in enumerate(self._parts()):
+            yield None if part is None else self._of(part, wanted)
+            if number in self.survey.cut:
+                yield None
 
     def _of(self, part: bytes, wanted: frozenset[int]) -> list[McapMessage]:
         found = []
@@ -126,7 +167,9 @@ class McapFile:
     def _surveyed(self) -> Survey:
         self.survey = survey = Survey()
         before = latest = 0
-        for part in self._parts():
+        for number, part in enumerate(self._parts()):
+            if part is None:
+                continue
             before, whole = latest, 0
             for kind, content in _records_in(part):
                 whole += _RECORD_HEAD.size + len(content)
@@ -140,24 +183,33 @@ class McapFile:
                     latest = max(latest, stamp)
                     if stamp < before:
                         survey.in_order = False
-            survey.cut += whole < len(part)
+            if whole < len(part):
+                survey.cut.add(number)
         return survey
 
-    def _parts(self) -> Iterator[bytes]:
-        """The records of each chunk, and those between chunks, in the order of the file."""
+    def _parts(self) -> Iterator[bytes | None]:
+        """The records of each chunk, and those between chunks, in the order of the file.
+
+        None stands where some are missing.
+        """
         survey, loose = self.survey, bytearray()
         survey.damaged = 0
+        survey.packed_by.clear()
+        survey.gaps.clear()
         survey.indexed.clear()
-        for kind, start, length in self._records():
+        for kind, start, length in _records(self._file):
             if kind == _CHUNK:
                 if loose:
                     yield bytes(loose)
                     loose.clear()
-                chunk = _unpacked(self._content(start, length))
-                if chunk is None:
+                try:
+                    yield _unpacked(self._content(start, length))
+                except _PackedElsehowError as err:
+                    survey.packed_by[str(err)] += 1
+                    yield None
+                except _DamagedError:
                     survey.damaged += 1
-                else:
-                    yield chunk
+                    yield None
             elif kind in (_SCHEMA, _CHANNEL, _MESSAGE):
                 loose += _RECORD_HEAD.pack(kind, length) + self._content(start, length)
                 if len(loose) >= _PART:
@@ -167,26 +219,19 @@ class McapFile:
                 channel, size = _INDEX_HEAD.unpack(self._content(start, _INDEX_HEAD.size))
                 survey.indexed[channel] += min(size, length) // _INDEX_ENTRY
             elif kind == _STATISTICS:
-                survey.stated = _stated(self._content(start, length))
+                content = self._content(start, length)
+                survey.stated = _stated(content)
+                survey.total = None if survey.stated else _total(content)
+            elif kind == _NO_RECORD:
+                survey.gaps.append((start, start + length))
+                if loose:
+                    yield bytes(loose)
+                    loose.clear()
+                yield None
             elif kind == _FOOTER:
                 survey.is_complete = True
         if loose:
             yield bytes(loose)
-
-    def _records(self) -> Iterator[tuple[int, int, int]]:
-        """Kind, place and length of each whole record."""
-        end = self._file.seek(0, os.SEEK_END)
-        place = len(MAGIC)
-        while place + _RECORD_HEAD.size <= end:
-            self._file.seek(place)
-            kind, length = _RECORD_HEAD.unpack(self._file.read(_RECORD_HEAD.size))
-            place += _RECORD_HEAD.size
-            if place + length > end:
-                return
-            yield kind, place, length
-            place += length
-            if kind == _FOOTER:
-                return
 
     def _content(self, start: int, length: int) -> bytes:
         self._file.seek(start)
@@ -212,35 +257,111 @@ def _stamp(message: McapMessage) -> int:
 
 def packed_chunks(file: BinaryIO) -> Iterator[tuple[str, int, int]]:
     """Compression, place and size of what each chunk of a file packs."""
+    for kind, start, length in _records(file):
+        if kind == _CHUNK:
+            with contextlib.suppress(struct.error, UnicodeDecodeError):
+                file.seek(start)
+                head = memoryview(file.read(min(length, 128)))
+                compression, place = _text(head, 28)
+                (size,) = struct.unpack_from("<Q", head, place)
+                yield compression, start + place + 8, min(size, length)
+
+
+def _records(file: BinaryIO) -> Iterator[tuple[int, int, int]]:
+    """Kind, place and length of each whole record; of `_NO_RECORD` where there are none.
+
+    Where the heads of records are damaged the next chunk, or the summary, is found by the summary.
+    """
     end = file.seek(0, os.SEEK_END)
+    known = _known_places(file, end)
     place = len(MAGIC)
-    with contextlib.suppress(struct.error, UnicodeDecodeError):
-        while place + _RECORD_HEAD.size <= end:
+    while place + _RECORD_HEAD.size <= end:
+        file.seek(place)
+        kind, length = _RECORD_HEAD.unpack(file.read(_RECORD_HEAD.size))
+        following = place + _RECORD_HEAD.size + length
+        later = bisect_right(known, place)
+        bound = known[later] if later < len(known) else end
+        if kind in _KINDS and following <= bound:
+            yield kind, place + _RECORD_HEAD.size, length
+            if kind == _FOOTER:
+                return
+            place = following
+        elif later < len(known):
+            yield _NO_RECORD, place, bound - place
+            place = bound
+        else:
+            if kind not in _KINDS:
+                yield _NO_RECORD, place, end - place
+            return
+
+
+def _known_places(file: BinaryIO, end: int) -> list[int]:
+    """Where chunks and the summary begin, as the summary has it; nothing where there is none."""
+    try:
+        file.seek(max(0, end - len(MAGIC) - _FOOTER_SIZE))
+        kind, length = _RECORD_HEAD.unpack(file.read(_RECORD_HEAD.size))
+        summary, _, _ = _FOOTER_CONTENT.unpack(file.read(_FOOTER_CONTENT.size))
+        if kind != _FOOTER or length != _FOOTER_CONTENT.size or file.read() != MAGIC:
+            return []
+        footer = end - len(MAGIC) - _FOOTER_SIZE
+        if not len(MAGIC) <= summary < footer:
+            return [footer]
+        places, place = {summary, footer}, summary
+        while place + _RECORD_HEAD.size <= footer:
             file.seek(place)
             kind, length = _RECORD_HEAD.unpack(file.read(_RECORD_HEAD.size))
-            place += _RECORD_HEAD.size
-            if kind == _FOOTER or place + length > end:
-                return
-            if kind == _CHUNK:
-                head = memoryview(file.read(min(length, 128)))
-                compression, start = _text(head, 28)
-                (size,) = struct.unpack_from("<Q", head, start)
-                yield compression, place + start + 8, size
-            place += length
+            if kind == _CHUNK_INDEX:
+                _, _, chunk = _CHUNK_INDEX_HEAD.unpack(file.read(_CHUNK_INDEX_HEAD.size))
+                if len(MAGIC) <= chunk < summary and _begins_chunk(file, chunk, summary):
+                    places.add(chunk)
+            place += _RECORD_HEAD.size + length
+        return sorted(places)
+    except struct.error:
+        return []
 
 
-def _unpacked(chunk: bytes) -> bytes | None:
-    """The records of a chunk; None where they cannot be had."""
+def _begins_chunk(file: BinaryIO, place: int, end: int) -> bool:
+    file.seek(place)
+    kind, length = _RECORD_HEAD.unpack(file.read(_RECORD_HEAD.size))
+    return bool(kind == _CHUNK and place + _RECORD_HEAD.size + length <= end)
+
+
+class _DamagedError(Exception):
+    """A chunk cannot be unpacked."""
+
+
+class _PackedElsehowError(Exception):
+    """A chunk is packed in a way that is not known here, which is the text."""
+
+
+def _unpacked(chunk: bytes) -> bytes:
+    """The records of a chunk.
+
+    Raises:
+        _DamagedError: They cannot be had.
+        _PackedElsehowError: Nor can they, by the means that are here.
+        ImportError: The library that unpacks them is missing.
+    """
     try:
         view = memoryview(chunk)
         _, _, _, check = struct.unpack_from("<QQQI", view)
         compression, place = _text(view, 28)
         (size,) = struct.unpack_from("<Q", view, place)
         packed = chunk[place + 8 : place + 8 + size]
-        records = _UNPACKING[compression](packed)
-    except Exception:  # of struct, zstd, lz4, ...: whatever the bytes provoke
-        return None
-    return None if check and zlib.crc32(records) != check else records
+    except (struct.error, UnicodeDecodeError) as err:
+        raise _DamagedError from err
+    unpack = _UNPACKING.get(compression)
+    if unpack is None:
+        raise _PackedElsehowError(compression)
+    try:
+        records = unpack(packed)
+    except ImportError:
+        raise
+    except Exception as err:  # of zstd or lz4: whatever the bytes provoke
+        raise _DamagedError from err
+    if check and zlib.crc32(records) != check:
+        raise _DamagedError
+    return records
 
 
 def _records_in(part: bytes) -> Iterator[tuple[int, memoryview]]:
@@ -265,19 +386,21 @@ def _text(content: memoryview, place: int) -> tuple[str, int]:
     return bytes(content[place : place + length]).decode(), place + length
 
 
+def _total(content: bytes) -> int | None:
+    """Messages, as a file's statistics count them."""
+    with contextlib.suppress(struct.error):
+        (count,) = struct.unpack_from("<Q", content)
+        return int(count)
+    return None
+
+
 def _stated(content: bytes) -> dict[int, int] | None:
-    """Messages by channel, as a file's statistics count them."""
+    """Messages by channel, as a file's statistics count them; None where they do not."""
     with contextlib.suppress(struct.error):
         (length,) = struct.unpack_from("<I", content, 42)
         counts = {}
         for place in range(46, 46 + length, 10):
             channel, count = struct.unpack_from("<HQ", content, place)
             counts[channel] = count
-        return counts
+        return counts or None
     return None
-
-
-def is_mcap(path: Path) -> bool:
-    """Whether a file begins like one."""
-    with path.open("rb") as file:
-        return file.read(len(MAGIC)) == MAGIC

@@ -1,24 +1,39 @@
-"""SQLite files of rosbag2, with what their write-ahead log still holds."""
+"""SQLite files of rosbag2, with what their write-ahead log still holds.
+
+A file that is damaged or cut off is read page by page: see `sqlite_pages`.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import shutil
 import sqlite3
+import struct
 import tempfile
+from collections import Counter
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
 
+from rebt_ros.storage.sqlite_pages import SqlitePages
+
 MAGIC: Final = b"SQLite format 3\0"
+
+#: Number of the topic of what stands for messages that are missing.
+GAP: Final = -1
 
 #: SQLite instructions that are granted per byte of a file, and to any file.
 _STEPS_PER_BYTE: Final = 20
 _STEPS: Final = 1_000_000
 _STEPS_AT_ONCE: Final = 10_000
 _LEAST_LENGTH: Final = 1 << 16
+
+_LOG_HEAD: Final = 32
+_FRAME_HEAD: Final = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,69 +44,216 @@ class SqliteTopic:
     name: str
     kind: str
     encoding: str
-    messages: int
+
+
+@dataclass(slots=True)
+class SqliteFile:
+    """An open file; see `opened` and `messages`."""
+
+    path: Path
+    connection: sqlite3.Connection
+    topics: tuple[SqliteTopic, ...] = ()
+    found: Counter[int] = field(default_factory=Counter)
+    """Messages by the number of their topic."""
+    notes: list[str] = field(default_factory=list)
+    """What is wrong with it, in words that follow the file's name; no full stops."""
+    is_damaged: bool = False
+    """Whether it is read page by page."""
+
+    @property
+    def undeclared(self) -> int:
+        """How many messages belong to no topic of the file."""
+        known = {topic.number for topic in self.topics}
+        return sum(count for number, count in self.found.items() if number not in known)
+
+    def messages(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+        """Topic, stamp and data of the messages of some topics, by their stamps.
+
+        Among them are messages of the topic `GAP` where others are missing.
+        """
+        if not self.is_damaged:
+            try:
+                # SQLite sorts all of them before it gives the first.
+                yield from self._by_sqlite(numbers)
+            except sqlite3.DatabaseError as err:
+                _refuse_interrupted(err)
+                self._survey_pages(str(err))
+            else:
+                return
+        yield from self._from_pages(numbers)
+
+    def _from_pages(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+        with self.path.open("rb") as file:
+            found = sorted(SqlitePages(file).messages(), key=lambda message: message.number)
+        wanted: list[tuple[int, int, bytes]] = []
+        expected, is_gap = 1, False
+        for one in found:
+            is_gap = is_gap or one.number > expected
+            expected = one.number + 1
+            if one.topic in numbers:
+                if is_gap:
+                    wanted.append((GAP, one.stamp, b""))
+                    is_gap = False
+                wanted.append((one.topic, one.stamp, one.data))
+        yield from sorted(wanted, key=itemgetter(1))
+
+    def survey(self) -> None:
+        """Notes the topics and counts the messages.
+
+        Raises:
+            sqlite3.Error: The topics cannot be read.
+        """
+        rows = self.connection.execute(
+            "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
+        )
+        self.topics = tuple(
+            SqliteTopic(int(number), str(name), str(kind), str(encoding))
+            for number, name, kind, encoding in rows
+        )
+        if _is_cut(self.path):
+            # SQLite would take what is missing of a page for zeros.
+            self._survey_pages("it ends before its end")
+            return
+        try:
+            # An index may be damaged where the table is not.
+            counts = self.connection.execute(
+                "SELECT topic_id, count(*) FROM messages NOT INDEXED GROUP BY topic_id"
+            )
+            self.found.update({_number(number): int(count) for number, count in counts})
+        except sqlite3.DatabaseError as err:
+            _refuse_interrupted(err)
+            self._survey_pages(str(err))
+
+    def _by_sqlite(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+        marks = ", ".join("?" * len(numbers))
+        for number, stamp, data in self.connection.execute(
+            "SELECT topic_id, timestamp, data FROM messages NOT INDEXED "
+            f"WHERE topic_id IN ({marks}) ORDER BY timestamp, id",
+            tuple(numbers),
+        ):
+            # A number or a text there is no message; `bytes` would make one of as many zeros.
+            usable = isinstance(data, bytes) and isinstance(stamp, int)
+            yield int(number), stamp if usable else 0, data if usable else b""
+
+    def _survey_pages(self, why: str) -> None:
+        """Counts the messages on pages, as SQLite cannot read all of them."""
+        self.is_damaged = True
+        self.found.clear()
+        with self.path.open("rb") as file:
+            pages = SqlitePages(file)
+            self.found.update(one.topic for one in pages.messages())
+        count = self.found.total()
+        # Recorders number messages from 1.
+        lost = f" of at least {pages.highest}" if pages.highest > count else ""
+        self.notes.append(f"is damaged ({why}): {count}{lost} messages could be read")
 
 
 @contextlib.contextmanager
-def opened(path: Path) -> Iterator[sqlite3.Connection]:
+def opened(path: Path) -> Iterator[SqliteFile]:
     """A file of rosbag2, for reading only.
 
     A write-ahead log beside it is read on a copy, as SQLite writes to a file that has one.
 
     Raises:
-        sqlite3.Error: It is no such file, or a damaged one.
+        sqlite3.Error: It is no such file, or so damaged that its topics cannot be read.
         ValueError: There is something in it that computes.
+        OSError: It cannot be read, or there is no room for the copy.
     """
     log = path.with_name(f"{path.name}-wal")
     if not (log.is_file() and log.stat().st_size):
-        with contextlib.closing(_connected(path, "mode=ro&immutable=1")) as connection:
-            yield connection
+        with _opened_plain(path) as file:
+            yield file
         return
     with tempfile.TemporaryDirectory() as directory:
         copy = Path(directory, "bag.db3")
         shutil.copyfile(path, copy)
-        shutil.copyfile(log, copy.with_name(f"{copy.name}-wal"))
-        with contextlib.closing(_connected(copy, "mode=rw")) as connection:
-            yield connection
+        note = _with_log(copy, log)
+        with _opened_plain(copy) as file:
+            file.notes += note
+            yield file
 
 
-def topics(connection: sqlite3.Connection) -> tuple[SqliteTopic, ...]:
-    """The topics of a file, with how many messages each has."""
-    rows = connection.execute(
-        "SELECT topics.id, name, type, serialization_format, count(messages.id) FROM topics "
-        "LEFT JOIN messages ON topics.id == messages.topic_id GROUP BY topics.id ORDER BY topics.id"
-    )
-    return tuple(
-        SqliteTopic(int(number), str(name), str(kind), str(encoding), int(count))
-        for number, name, kind, encoding, count in rows
-    )
+@contextlib.contextmanager
+def _opened_plain(path: Path) -> Iterator[SqliteFile]:
+    with contextlib.closing(_connected(path)) as connection:
+        file = SqliteFile(path, connection)
+        file.survey()
+        yield file
 
 
-def undeclared(connection: sqlite3.Connection) -> int:
-    """How many messages belong to no topic of the file."""
-    [(count,)] = connection.execute(
-        "SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)"
-    )
-    return int(count)
-
-
-def messages(
-    connection: sqlite3.Connection, numbers: Collection[int]
-) -> Iterator[tuple[int, int, bytes]]:
-    """Topic, stamp and data of the messages of some topics, by their stamps."""
-    marks = ", ".join("?" * len(numbers))
-    for number, stamp, data in connection.execute(
-        f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) "
-        "ORDER BY timestamp, id",
-        tuple(numbers),
+def _with_log(copy: Path, log: Path) -> list[str]:
+    """Moves what a write-ahead log holds into a copy of its file; notes what does not go."""
+    begin = copy.with_name(f"{copy.name}-wal")
+    shutil.copyfile(log, begin)
+    frames = _frames_of(log)
+    moved = 0
+    with (
+        contextlib.closing(sqlite3.connect(copy)) as connection,
+        contextlib.suppress(sqlite3.DatabaseError),
     ):
-        # A number or a text there is no message; `bytes` would make one of as many zeros.
-        yield int(number), int(stamp), data if isinstance(data, bytes) else b""
+        connection.execute("PRAGMA writable_schema = ON")
+        [(_, moved, _)] = connection.execute("PRAGMA wal_checkpoint(FULL)")
+    moved = max(moved, 0)
+    begin.unlink(missing_ok=True)
+    if frames is None:
+        size = log.stat().st_size
+        return [f"has a write-ahead log of {size} bytes that is damaged: it was not read"]
+    if moved < frames:
+        return [
+            f"has a write-ahead log whose last {frames - moved} of {frames} pages are not complete "
+            "or damaged: they were not read"
+        ]
+    return []
 
 
-def _connected(path: Path, how: str) -> sqlite3.Connection:
+def _frames_of(log: Path) -> int | None:
+    """Pages of the last generation in a log; None where its head is damaged."""
+    with log.open("rb") as file:
+        head = file.read(_LOG_HEAD)
+        if len(head) < _LOG_HEAD:
+            return None
+        magic, _, page, _ = struct.unpack_from(">IIII", head)
+        if magic not in (0x377F0682, 0x377F0683) or page < 512 or page & (page - 1):
+            return None
+        end = file.seek(0, os.SEEK_END)
+        frames = -(-(end - _LOG_HEAD) // (_FRAME_HEAD + page))
+        for number in range(frames):
+            file.seek(_LOG_HEAD + number * (_FRAME_HEAD + page))
+            frame = file.read(_FRAME_HEAD)
+            if frame[8:16] != head[16:24]:
+                return number
+    return frames
+
+
+def _is_cut(path: Path) -> bool:
+    """Whether a file is shorter than it says."""
+    with path.open("rb") as file:
+        head = file.read(32)
+        end = file.seek(0, os.SEEK_END)
+    (page,) = struct.unpack_from(">H", head, 16)
+    (pages,) = struct.unpack_from(">I", head, 28)
+    return bool(end < pages * (65536 if page == 1 else page))
+
+
+def _number(value: object) -> int:
+    """The number of a topic; one that no topic has where it is none."""
+    return value if isinstance(value, int) else -1
+
+
+def _refuse_interrupted(err: sqlite3.DatabaseError) -> None:
+    """Passes on that a file makes SQLite compute too much, which is no damage.
+
+    Raises:
+        sqlite3.DatabaseError: It does.
+    """
+    if err.sqlite_errorcode == sqlite3.SQLITE_INTERRUPT:
+        raise err
+
+
+def _connected(path: Path) -> sqlite3.Connection:
     size = path.stat().st_size
-    connection = sqlite3.connect(f"file:{quote(str(path.absolute()))}?{how}", uri=True)
+    address = quote(os.fsencode(path.absolute()))
+    connection = sqlite3.connect(f"file:{address}?mode=ro&immutable=1", uri=True)
     left = _STEPS + _STEPS_PER_BYTE * size
 
     def too_long() -> bool:
@@ -103,6 +265,8 @@ def _connected(path: Path, how: str) -> sqlite3.Connection:
     connection.set_progress_handler(too_long, _STEPS_AT_ONCE)
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(size, _LEAST_LENGTH))
     try:
+        # Else a file that was cut off is not opened at all; nothing is written to it.
+        connection.execute("PRAGMA writable_schema = ON")
         _check_schema(connection)
     except BaseException:
         connection.close()

@@ -149,8 +149,10 @@ def experiments() -> tuple[str, ...]:
     return (json.dumps({"type_": "selector", "name": "root", "child_list": groups}),)
 
 
-def bag(path: Path, storage: StoragePlugin, compression: CompressionMode | None) -> Path:
-    """Writes a bag of 40 messages."""
+def bag(
+    path: Path, storage: StoragePlugin, compression: CompressionMode | None, count: int = 20
+) -> Path:
+    """Writes a bag of as many states, and as many actions."""
     types = get_typestore(Stores.ROS2_JAZZY)
     with_layout = types.types[STATE], types.types["std_msgs/msg/MultiArrayLayout"]
     writer = Writer(path, version=9, storage_plugin=storage)
@@ -159,12 +161,12 @@ def bag(path: Path, storage: StoragePlugin, compression: CompressionMode | None)
     with writer:
         state = writer.add_connection("/state", STATE, typestore=types)
         action = writer.add_connection("/action", ACTION, typestore=types)
-        for count in range(20):
-            values = np.array([count / 3, -count, 1e9])
+        for number in range(count):
+            values = np.array([number / 3, -number, 1e9])
             message = with_layout[0](layout=with_layout[1](dim=[], data_offset=0), data=values)
-            writer.write(state, 2 * count, types.serialize_cdr(message, STATE))
-            label = types.types[ACTION](data=("go", "turn", "wait")[count % 3])
-            writer.write(action, 2 * count + 1, types.serialize_cdr(label, ACTION))
+            writer.write(state, 2 * number, types.serialize_cdr(message, STATE))
+            label = types.types[ACTION](data=("go", "turn", "wait")[number % 3])
+            writer.write(action, 2 * number + 1, types.serialize_cdr(label, ACTION))
     return path
 
 
