@@ -216,7 +216,7 @@ def _frames_of(log: Path) -> int | None:
         if magic not in (0x377F0682, 0x377F0683) or page < 512 or page & (page - 1):
             return None
         end = file.seek(0, os.SEEK_END)
-        frames = -(-(end - _LOG_HEAD) // (_FRAME_HEAD + page))
+        frames = int(-(-(end - _LOG_HEAD) // (_FRAME_HEAD + page)))
         for number in range(frames):
             file.seek(_LOG_HEAD + number * (_FRAME_HEAD + page))
             frame = file.read(_FRAME_HEAD)

@@ -7,6 +7,7 @@ columns: no number (which is that of the row), two integers, and the data.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import struct
 from collections.abc import Iterator
@@ -79,8 +80,8 @@ class SqlitePages:
             begin = _HEAD_SIZE if number == 1 else 0
             if page[begin : begin + 1] == bytes([_INTERIOR]):
                 for place in _places(page, begin, _INTERIOR_HEAD):
-                    key, _ = _varint(page, place + 4)
-                    self.highest = max(self.highest, key)
+                    with contextlib.suppress(IndexError):
+                        self.highest = max(self.highest, _varint(page, place + 4)[0])
             elif page[begin : begin + 1] == bytes([_LEAF]):
                 for place in _places(page, begin, _LEAF_HEAD):
                     message = self._message(page, place)

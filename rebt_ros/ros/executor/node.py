@@ -22,6 +22,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.demonstration.builder import BadMessageError
 from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
+from rebt_ros.demonstration.fields import values_of
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError
 from rebt_ros.live.background import Background
@@ -29,7 +30,6 @@ from rebt_ros.live.novelty_guard import NoveltyGuard
 from rebt_ros.live.takeover import Takeover, channel_of
 from rebt_ros.live.tree_inputs import Message
 from rebt_ros.ros import lifetime
-from rebt_ros.ros.arrays import values_of
 from rebt_ros.ros.command_channels import DRIVING_QOS, CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.executor.settings import declare_settings

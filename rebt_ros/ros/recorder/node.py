@@ -19,6 +19,7 @@ from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
+from rebt_ros.demonstration.fields import names_of, values_of
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
 from rebt_ros.live.arrival import LAST, ArrivalOrder
@@ -26,7 +27,6 @@ from rebt_ros.live.losses import Losses
 from rebt_ros.live.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
 from rebt_ros.live.state_streams import StateStreams
 from rebt_ros.ros import lifetime
-from rebt_ros.ros.arrays import names_of, values_of
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.graph_watch import GraphWatch

@@ -8,8 +8,8 @@ from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool
 
+from rebt_ros.demonstration.fields import names_of, values_of
 from rebt_ros.ros import lifetime
-from rebt_ros.ros.arrays import names_of, values_of
 from rebt_ros.ros.diagnostics import Faults
 from rebt_ros.ros.parameters import Parameters
 from rebt_ros.simulated_robot.demonstrator import decide
