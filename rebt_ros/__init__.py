@@ -32,18 +32,18 @@ if TYPE_CHECKING:
         Sequence,
     )
     from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
-    from rebt_ros.beyond_the_paper.priority_root import Reductions
+    from rebt_ros.beyond_the_paper.reductions import Reductions
     from rebt_ros.decision_tree.upsampling import Upsampling
     from rebt_ros.demonstration.builder import StateTopic
     from rebt_ros.demonstration.demonstration import RowKind
     from rebt_ros.demonstration.last_action import History
     from rebt_ros.demonstration.schema import Feature, FeatureKind
     from rebt_ros.errors import DocumentError, InputError, OptionError, RebtError
-    from rebt_ros.learning.options import LearnOptions, Use
-    from rebt_ros.learning.pipeline import Learning, Progress
+    from rebt_ros.learning.learning import Learning
+    from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
     from rebt_ros.learning.policy import Decision, Policy, State
+    from rebt_ros.learning.progress import Progress
     from rebt_ros.learning.replaying import Disagreement, Replay
-    from rebt_ros.learning.suggestions import PsaChoice
     from rebt_ros.logic.conditions import (
         Difference,
         HasCategory,
@@ -54,7 +54,10 @@ if TYPE_CHECKING:
         PreviousActionIs,
         Threshold,
     )
-    from rebt_ros.offline.learn_and_replay import OfflineLearning, learn, replay
+    from rebt_ros.offline.learning_file import load_learning
+    from rebt_ros.offline.learning_from_files import learn
+    from rebt_ros.offline.replay_over_files import replay
+    from rebt_ros.offline.result import OfflineLearning
     from rebt_ros.storage.account import Account
     from rebt_ros.storage.inputs import InputOptions
 
@@ -111,6 +114,7 @@ __all__ = [
     "Upsampling",
     "Use",
     "learn",
+    "load_learning",
     "replay",
 ]
 
@@ -136,20 +140,20 @@ _HOMES = {
     "LastActionIs": "rebt_ros.logic.conditions",
     "LearnOptions": "rebt_ros.learning.options",
     "LearnedTree": "rebt_ros.behavior_tree.learned_tree",
-    "Learning": "rebt_ros.learning.pipeline",
+    "Learning": "rebt_ros.learning.learning",
     "Literal": "rebt_ros.logic.conditions",
     "Node": "rebt_ros.behavior_tree.nodes",
-    "OfflineLearning": "rebt_ros.offline.learn_and_replay",
+    "OfflineLearning": "rebt_ros.offline.result",
     "OptionError": "rebt_ros.errors",
     "Parallel": "rebt_ros.behavior_tree.nodes",
     "ParallelSelector": "rebt_ros.behavior_tree.nodes",
     "Policy": "rebt_ros.learning.policy",
     "PreviousActionIs": "rebt_ros.logic.conditions",
-    "Progress": "rebt_ros.learning.pipeline",
+    "Progress": "rebt_ros.learning.progress",
     "Provenance": "rebt_ros.behavior_tree.learned_tree",
-    "PsaChoice": "rebt_ros.learning.suggestions",
+    "PsaChoice": "rebt_ros.learning.options",
     "RebtError": "rebt_ros.errors",
-    "Reductions": "rebt_ros.beyond_the_paper.priority_root",
+    "Reductions": "rebt_ros.beyond_the_paper.reductions",
     "Repeater": "rebt_ros.behavior_tree.nodes",
     "Replay": "rebt_ros.learning.replaying",
     "Root": "rebt_ros.behavior_tree.learned_tree",
@@ -166,8 +170,9 @@ _HOMES = {
     "Threshold": "rebt_ros.logic.conditions",
     "Upsampling": "rebt_ros.decision_tree.upsampling",
     "Use": "rebt_ros.learning.options",
-    "learn": "rebt_ros.offline.learn_and_replay",
-    "replay": "rebt_ros.offline.learn_and_replay",
+    "learn": "rebt_ros.offline.learning_from_files",
+    "load_learning": "rebt_ros.offline.learning_file",
+    "replay": "rebt_ros.offline.replay_over_files",
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.tree import DecisionTree
-from rebt_ros.paper.re_bt_espresso import main_tree
+from rebt_ros.paper.rule_trees import main_tree
 from rebt_ros.paper.rules import dt_to_rules, dt_to_rules_psa
 
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.logic.conditions import IsTrue, LastActionIs, Literal
-from rebt_ros.paper.lat_graph import ActionNode, CycleNode, GraphNode, LatGraph
+from rebt_ros.paper.lat_nodes import ActionNode, CycleNode, GraphNode, LatGraph
 from rebt_ros.paper.lat_occurrences import Runs
-from rebt_ros.paper.re_bt_espresso import reduce_floats
+from rebt_ros.paper.rule_trees import reduce_floats
 from rebt_ros.paper.rules import Rule, in_its_own_words
 
 

@@ -20,8 +20,10 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
 from rebt_ros.learning import evaluation
-from rebt_ros.learning.choice import choose, convert, own_history_choices
-from rebt_ros.learning.cross_validation import CrossValidation, JudgedLevels, folds
+from rebt_ros.learning.choice import choose
+from rebt_ros.learning.conversion import convert, own_history_choices
+from rebt_ros.learning.cross_validation import CrossValidation, folds
+from rebt_ros.learning.judged_levels import JudgedLevels
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.logic.conditions import Difference
 

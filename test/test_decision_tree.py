@@ -23,8 +23,9 @@ from rebt_ros.decision_tree.encoding import (
     encode,
     exact_threshold,
 )
+from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.decision_tree.simplest import simplest
-from rebt_ros.decision_tree.training import TrainedTree, fit, train
+from rebt_ros.decision_tree.training import fit, train
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import NO_ACTION, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind

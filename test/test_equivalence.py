@@ -26,9 +26,11 @@ from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
 from rebt_ros.behavior_tree.prediction import States, choose, history_columns, triggered
 from rebt_ros.behavior_tree.runtime import TreeRuntime
-from rebt_ros.beyond_the_paper.priority_root import Reductions, reduced_tree
+from rebt_ros.beyond_the_paper.priority_root import reduced_tree
+from rebt_ros.beyond_the_paper.reductions import Reductions
 from rebt_ros.decision_tree.encoding import Vocabulary
-from rebt_ros.decision_tree.training import TrainedTree, fit, train
+from rebt_ros.decision_tree.fitted import TrainedTree
+from rebt_ros.decision_tree.training import fit, train
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind

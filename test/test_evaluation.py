@@ -110,15 +110,16 @@ def test_a_decision_tree_chooses_after_its_own_choices_what_its_behavior_trees_c
     trained = train(table, vocabulary=vocabulary, ccp_alpha=ccp_alpha)
     rules = leaf_rules(trained.tree, lambda leaf: (leaf.most_probable,))
     for rows in (table, other, other.where(np.arange(len(other)) > 0)):
-        chosen = decision_tree_choices(trained, rows).tolist()
+        chosen = decision_tree_choices(trained.predict, trained.vocabulary.history, rows).tolist()
         for tree in (algorithm_1(trained.tree, delta=None), reduced_tree(rules)):
             assert chosen == own_history_choices(tree, rows).tolist()
 
 
 def test_of_a_decision_tree_that_tests_lat_there_are_no_such_choices() -> None:
     table = rows_of([0, 2, 0, 2])
+    trained = train(table, vocabulary=some.LAT)
     with pytest.raises(ValueError, match="LAT depends on the rule that asks"):
-        decision_tree_choices(train(table, vocabulary=some.LAT), table)
+        decision_tree_choices(trained.predict, trained.vocabulary.history, table)
 
 
 @settings(max_examples=80)

@@ -18,6 +18,7 @@ import pytest
 
 from rebt_ros.commands import experiment
 from rebt_ros.errors import OptionError
+from rebt_ros.study import experiment as study_experiment
 from rebt_ros.study import workers
 from rebt_ros.study.configurations import Lost
 from rebt_ros.study.experiment import run_experiment
@@ -155,8 +156,8 @@ def test_what_is_finished_is_not_run_again(
         ran.append(config.name)
         return original(config, settings)
 
-    original = workers.attempt
-    monkeypatch.setattr(workers, "attempt", attempt)
+    original = study_experiment.attempt
+    monkeypatch.setattr(study_experiment, "attempt", attempt)
     run_experiment(configurations, out, SETTINGS, jobs=1)
     assert ran == ["expr10"]
     run_experiment(configurations, straight, SETTINGS, jobs=1)
@@ -343,6 +344,8 @@ def test_without_distributed_a_cluster_is_refused_with_the_remedy(
 def test_when_nothing_is_left_to_report_the_first_reason_is_given(
     configurations: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workers, "attempt", lambda config, _: Lost(config.name, "it broke"))
+    monkeypatch.setattr(
+        study_experiment, "attempt", lambda config, _: Lost(config.name, "it broke")
+    )
     with pytest.raises(Exception, match="nothing to report: it broke"):
         run_experiment(configurations, tmp_path, SETTINGS, jobs=1)

@@ -11,25 +11,25 @@ from xml.etree import ElementTree
 import pytest
 
 from rebt_ros.errors import InputError
-from rebt_ros.study.agreement import Agreement
 from rebt_ros.study.bars import BarChart, Series, bar_chart_svg, histogram
 from rebt_ros.study.configurations import Lost
 from rebt_ros.study.figures import Contest, Share, mode_figures
-from rebt_ros.study.modes import Mode
+from rebt_ros.study.mode import Mode
 from rebt_ros.study.page import report_page
 from rebt_ros.study.reduction import Size, SizeComparison
 from rebt_ros.study.report import Report, report_csv, report_json, report_of, rows_of_table
 from rebt_ros.study.results import (
+    Agreement,
     ConfigurationResult,
     LevelSizes,
     ModeResult,
     NetworkxPair,
     Pairs,
+    Score,
     SubtreeResult,
     decoded,
     encoded,
 )
-from rebt_ros.study.scores import Score
 from rebt_ros.study.settings import Settings
 
 HOSTILE = "<script>alert('x')</script>\x1b&\"'"

@@ -16,7 +16,8 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.behavior_tree.prediction import States, as_it_stands
 from rebt_ros.behavior_tree.runtime import TreeRuntime
-from rebt_ros.beyond_the_paper.priority_root import ALL_REDUCTIONS, reduced_tree
+from rebt_ros.beyond_the_paper.priority_root import reduced_tree
+from rebt_ros.beyond_the_paper.reductions import ALL_REDUCTIONS
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.training import train
 from rebt_ros.decision_tree.tree import DecisionTree, Leaf, Split

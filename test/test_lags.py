@@ -28,7 +28,8 @@ from rebt_ros.learning.options import LearnOptions
 from rebt_ros.learning.pipeline import learn, learn_channels
 from rebt_ros.learning.replaying import replay
 from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, Literal, Threshold
-from rebt_ros.offline import learn_and_replay as offline
+from rebt_ros.offline import learning_from_files as offline
+from rebt_ros.offline.replay_over_files import replay as replay_files
 
 #: As `some.FEATURES`, but every value can come from a topic.
 FEATURES = (*some.FEATURES[:3], replace(some.FEATURES[3], categories=("0", "1", "2")))
@@ -191,7 +192,7 @@ def test_tables_are_learned_and_replayed_with_lags_from_files(tmp_path: Path) ->
     table.write_text("\n".join(["y,x,action", *rows]) + "\n")
     offline.learn([table], out=tmp_path / "learned", options=LearnOptions(lags=3))
     assert json.loads((tmp_path / "learned" / "summary.json").read_text())["lags"] == 3
-    (result,) = offline.replay(tmp_path / "learned" / "tree.json", [table])
+    (result,) = replay_files(tmp_path / "learned" / "tree.json", [table])
     assert result.own_history_agreement == 1.0
 
 

@@ -27,7 +27,8 @@ from lat_examples import (
 
 from rebt_ros.paper import lat_cycles
 from rebt_ros.paper.lat_cycles import Acyclic, CycleStart, remove_cycles
-from rebt_ros.paper.lat_graph import ActionNode, CycleNode, LatGraph, generate_graph
+from rebt_ros.paper.lat_graph import generate_graph
+from rebt_ros.paper.lat_nodes import ActionNode, CycleNode, LatGraph
 from rebt_ros.paper.lat_occurrences import Occurrences, Runs, rows, runs
 from rebt_ros.paper.lat_paths import source_to_sink_paths
 from rebt_ros.paper.rules import Rule

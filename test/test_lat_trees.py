@@ -40,7 +40,7 @@ from rebt_ros.paper.lat_cycles import CycleStart, remove_cycles
 from rebt_ros.paper.lat_graph import generate_graph
 from rebt_ros.paper.lat_occurrences import Occurrences, Runs
 from rebt_ros.paper.lat_trees import LatTree, LeftOut, gen_lat_trees
-from rebt_ros.paper.re_bt_espresso import build_inv_set
+from rebt_ros.paper.rule_trees import build_inv_set
 from rebt_ros.paper.rules import Rule
 
 CONDITIONS = tuple(Feature(f"C_{number}", FeatureKind.BINARY) for number in range(10))

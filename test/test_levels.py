@@ -7,7 +7,7 @@ import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -21,9 +21,12 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import OptionError
 from rebt_ros.learning import evaluation, pipeline
-from rebt_ros.learning.levels import Family
+from rebt_ros.learning.learning import Learning
+from rebt_ros.learning.levels import Levels
 from rebt_ros.learning.options import LearnOptions, Use
-from rebt_ros.offline import learn_and_replay as offline
+from rebt_ros.offline import learning_from_files as offline
+from rebt_ros.offline.result import OfflineLearning
+from rebt_ros.storage.inputs import InputOptions, load
 from rebt_ros.storage.tree_file import read_tree
 
 ALWAYS = ["decision_tree.dot", "decision_tree.svg", "tree.dot", "tree.json", "tree.svg"]
@@ -52,7 +55,18 @@ def shown(*rows: Row) -> Demonstration:
 
 
 def family(options: LearnOptions = OPTIONS, **of: Any) -> Family:
-    return Family(pipeline.learn_from(tabulate([shown(*rows_of(**of))])[0], options), options)
+    learning = pipeline.learn_from(tabulate([shown(*rows_of(**of))])[0], options)
+    return Family(learning, learning.levels)
+
+
+class Family(NamedTuple):
+    """A learned policy, and its pruning levels."""
+
+    learning: Learning
+    levels: Levels
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.levels, name)
 
 
 def csv(path: Path, rows: list[Row]) -> Path:
@@ -62,7 +76,7 @@ def csv(path: Path, rows: list[Row]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, offline.OfflineLearning]:
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, OfflineLearning]:
     """A directory with all levels, and what was learned."""
     out = tmp_path_factory.mktemp("family")
     table = csv(out / "table.csv", rows_of())
@@ -195,7 +209,7 @@ def test_fewer_levels_than_are_always_written_are_refused_before_any_work(tmp_pa
 
 
 def test_each_level_has_a_directory_with_its_tree_and_pictures(
-    written: tuple[Path, offline.OfflineLearning],
+    written: tuple[Path, OfflineLearning],
 ) -> None:
     pytest.importorskip("matplotlib")
     out, result = written
@@ -212,13 +226,13 @@ def test_each_level_has_a_directory_with_its_tree_and_pictures(
         ET.parse(directory / "decision_tree.svg")
     chosen = next(one for one in summary if one["chosen"])
     assert read_tree(out / "levels" / chosen["level"] / "tree.json").tree == result.learned.tree
-    level = Family(result.learnings[0], OPTIONS).level(int(chosen["level"]))
+    level = result.learnings[0].levels.level(int(chosen["level"]))
     figures = level.learned.provenance.figures
     assert chosen["own_history_agreement"] == figures.own_history_agreement
 
 
 def test_the_summary_has_the_figures_of_every_level(
-    written: tuple[Path, offline.OfflineLearning],
+    written: tuple[Path, OfflineLearning],
 ) -> None:
     out, result = written
     judged = result.learnings[0].policy.levels
@@ -234,7 +248,7 @@ def test_the_summary_has_the_figures_of_every_level(
 
 
 def test_the_plot_stands_beside_the_levels(
-    written: tuple[Path, offline.OfflineLearning],
+    written: tuple[Path, OfflineLearning],
 ) -> None:
     pytest.importorskip("matplotlib")
     out, _ = written
@@ -301,7 +315,7 @@ def test_each_channel_has_a_directory_of_its_own(
 ) -> None:
     # Of what is read only the demonstrations matter here.
     rows = [*rows_of(rows=80, channel="/base/do it"), *rows_of(rows=80, channel="arm")]
-    loaded = offline.load([csv(tmp_path / "t.csv", rows)], offline.InputOptions())
+    loaded = load([csv(tmp_path / "t.csv", rows)], InputOptions())
     monkeypatch.setattr(offline, "load", lambda *_: replace(loaded, demonstrations=(shown(*rows),)))
     rebt_ros.learn(["both"], out=tmp_path / "out", options=OPTIONS, levels=True)
     assert names(tmp_path / "out" / "channels") == ["arm", "base_do_it"]

@@ -25,8 +25,9 @@ from rebt_ros.behavior_tree.document import loads
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.options import LearnOptions, Use
-from rebt_ros.learning.pipeline import Learning, learn_from
+from rebt_ros.learning.pipeline import learn_from
 from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.inputs import load
 

@@ -14,7 +14,7 @@ from rebt_ros.logic.float_reduction import implied_literals, implies, reduced
 from rebt_ros.logic.intervals import enclosing_literals, with_intervals
 from rebt_ros.logic.numbered import Numbering, mask
 from rebt_ros.paper.re_bt_espresso import rule_tree
-from rebt_ros.paper.rules import FactoredRule
+from rebt_ros.paper.rule_trees import FactoredRule
 
 
 @given(some.dnfs())

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rebt_ros.decision_tree.encoding import Vocabulary
-from rebt_ros.decision_tree.training import FittedTree, fit, fit_parts
+from rebt_ros.decision_tree.fitted import FittedTree
+from rebt_ros.decision_tree.training import fit, fit_parts
 from rebt_ros.demonstration.table import DemonstrationTable
 
 

@@ -12,7 +12,7 @@ import rebt_ros
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.beyond_the_paper import priority_root
-from rebt_ros.beyond_the_paper.routines.finding import FoundRoutine
+from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
 from rebt_ros.decision_tree.training import fit, train
 from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
@@ -22,11 +22,7 @@ from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.learning import evaluation, pipeline, suggesting
 from rebt_ros.learning.options import DEFAULTS, LearnOptions
-from rebt_ros.learning.pipeline import (
-    learn,
-    learn_from,
-    summary_sentence,
-)
+from rebt_ros.learning.pipeline import learn, learn_from, summary_sentence
 from rebt_ros.logic.conditions import LastActionIs, PreviousActionIs
 from rebt_ros.storage.inputs import InputOptions
 

@@ -10,7 +10,8 @@ from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.logic.conditions import IsTrue, LastActionIs, Literal, Threshold
 from rebt_ros.logic.dnf import Conjunction, Dnf
-from rebt_ros.paper.re_bt_espresso import bt_espresso, build_inv_set, re_bt_espresso
+from rebt_ros.paper.re_bt_espresso import bt_espresso, re_bt_espresso
+from rebt_ros.paper.rule_trees import build_inv_set
 from rebt_ros.paper.rules import Rule, delta_close, dt_to_rules, dt_to_rules_psa
 
 A, B, C = (nodes.Action(label, "action") for label in "abc")

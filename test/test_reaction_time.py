@@ -13,7 +13,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rebt_ros.decision_tree.encoding import Vocabulary
-from rebt_ros.decision_tree.training import FittedTree, fit
+from rebt_ros.decision_tree.fitted import FittedTree
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import (
     NO_ACTION,
     History,
@@ -24,7 +25,8 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
 from rebt_ros.learning import reaction_time
-from rebt_ros.learning.reaction_time import ReactionTime, Trial, estimate, rows_in, shifted
+from rebt_ros.learning.late_actions import rows_in, shifted
+from rebt_ros.learning.reaction_time import ReactionTime, Trial, estimate
 
 X = (Feature("x"), Feature("noise"))
 LEFT, RIGHT, STAY = 0, 1, 2

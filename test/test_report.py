@@ -17,7 +17,7 @@ import rebt_ros
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.learning.cross_validation import JudgedLevels
+from rebt_ros.learning.judged_levels import JudgedLevels
 from rebt_ros.learning.report import FORECAST, LearningReport, report_on
 from rebt_ros.logic.conditions import Literal, PreviousActionIs
 

@@ -18,7 +18,7 @@ from rebt_ros.demonstration.fields import Dimension, dimension_labels_of, fields
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.learning.options import LearnOptions, Use
-from rebt_ros.offline import learn_and_replay as offline
+from rebt_ros.offline import learning_from_files as offline
 from rebt_ros.storage.inputs import load
 from rebt_ros.study.simulator.configuration import (
     Act,

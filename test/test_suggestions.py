@@ -14,16 +14,9 @@ from test_lat_trees import CONDITIONS, Script, repeater, run, sequence
 from rebt_ros.behavior_tree import document, nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root, Suggestion, SuggestionKind
 from rebt_ros.errors import OptionError
-from rebt_ros.learning.suggestions import (
-    ALL,
-    PsaChoice,
-    attach,
-    going_on_after_loops,
-    lat_suggestions,
-    mark,
-    psa_suggestions,
-    resolve,
-)
+from rebt_ros.learning.attaching import attach, going_on_after_loops, mark, resolve
+from rebt_ros.learning.options import ALL, PsaChoice
+from rebt_ros.learning.suggestions import lat_suggestions, psa_suggestions
 from rebt_ros.paper.lat_trees import gen_lat_trees
 
 RULES = [

@@ -15,7 +15,7 @@ from std_msgs.msg import Bool, Float64MultiArray, String
 
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.learning.options import LearnOptions, Use
-from rebt_ros.offline import learn_and_replay as offline
+from rebt_ros.offline import learning_from_files as offline
 from rebt_ros.storage.inputs import load
 from rebt_ros.study.simulator.configuration import (
     Act,

@@ -12,11 +12,17 @@ and needs no condition at all.  The result chooses what the decision tree predic
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import cache
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.beyond_the_paper.reductions import (
+    ALL_REDUCTIONS,
+    MOST_LEAVES_BY_DOMAIN,
+    MOST_LEAVES_IN_BEST_ORDER,
+    MOST_LEAVES_MINIMIZED,
+    Reductions,
+)
 from rebt_ros.logic.conditions import deciding
 from rebt_ros.logic.dnf import Dnf, conditions_of
 from rebt_ros.logic.domain import infeasible, spelled_out
@@ -25,41 +31,15 @@ from rebt_ros.logic.float_reduction import implied_literals, reduced
 from rebt_ros.logic.intervals import enclosing_literals, intervals_among, with_intervals
 from rebt_ros.logic.minimize import cubes, minimized_cover
 from rebt_ros.logic.numbered import Codes, Numbering
-from rebt_ros.paper.rule_trees import rule_tree, with_root
-from rebt_ros.paper.rules import FactoredRule, Rule
-
-#: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and
-#: entanglement make espresso take minutes there.
-MOST_LEAVES_BY_DOMAIN = 40
+from rebt_ros.paper.rule_trees import FactoredRule, rule_tree, with_root
+from rebt_ros.paper.rules import Rule
 
 #: Up to so many rules the best order is found, then the order that is best step by step; yet more
 #: rules are ordered by their number of leaves, as a search would take a minimization per pair.
 _MOST_RULES_IN_ANY_ORDER, _MOST_RULES_STEP_BY_STEP = 6, 16
 
-#: In larger decision trees, too, rules are ordered by their number of leaves.
-MOST_LEAVES_IN_BEST_ORDER = 500
-#: Rules of yet larger ones keep the decision tree's conditions: espresso would take minutes.
-MOST_LEAVES_MINIMIZED = 2000
-
 #: Nodes of any rule that has a condition: a Sequence of the condition and an action.
 _LEAST_COST = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Reductions:
-    """The reductions past the paper, each of which can be left out."""
-
-    domain: bool = True
-    """Infeasible combinations of conditions are don't-cares, in trees of up to 40 leaves."""
-    repeated_factoring: bool = True
-    """Factoring is repeated instead of done once."""
-    priority: bool = True
-    """Rules stand in order of priority, with the states of earlier ones as don't-cares."""
-    intervals: bool = True
-    """Two thresholds that enclose a feature are one condition."""
-
-
-ALL_REDUCTIONS = Reductions()
 
 
 def reduced_tree(

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from rebt_ros.logic.conditions import Literal
 from rebt_ros.paper.lat_cycles import Acyclic, CycleStart, remove_cycles
-from rebt_ros.paper.lat_graph import ActionNode, CycleNode, LatGraph, generate_graph
+from rebt_ros.paper.lat_graph import generate_graph
+from rebt_ros.paper.lat_nodes import ActionNode, CycleNode, LatGraph
 from rebt_ros.paper.lat_occurrences import Occurrences
 from rebt_ros.paper.lat_trees import LatTree, repeater
 from rebt_ros.paper.rules import Rule

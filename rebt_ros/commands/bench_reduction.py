@@ -28,7 +28,8 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.learning.evaluation import teacher_forced_choices
-from rebt_ros.paper.re_bt_espresso import bt_espresso, main_tree
+from rebt_ros.paper.re_bt_espresso import bt_espresso
+from rebt_ros.paper.rule_trees import main_tree
 from rebt_ros.paper.rules import dt_to_rules_psa, leaf_rules
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.study.configurations import read_configs

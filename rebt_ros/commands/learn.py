@@ -13,7 +13,7 @@ import numpy as np
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
-from rebt_ros.beyond_the_paper.priority_root import Reductions
+from rebt_ros.beyond_the_paper.reductions import Reductions
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import (
     add_input_options,
@@ -29,13 +29,13 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import OptionError
-from rebt_ros.learning.choice import ChosenPolicy
-from rebt_ros.learning.cross_validation import JudgedLevels
-from rebt_ros.learning.options import LearnOptions, Use
+from rebt_ros.learning.chosen_policy import ChosenPolicy
+from rebt_ros.learning.judged_levels import JudgedLevels
+from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
 from rebt_ros.learning.pipeline import summary_sentence
 from rebt_ros.learning.report import FORECAST, LearningReport
-from rebt_ros.learning.suggestions import PsaChoice
-from rebt_ros.offline import learn_and_replay
+from rebt_ros.offline import learning_from_files
+from rebt_ros.offline.result import OfflineLearning
 
 _REDUCTIONS = {
     "domain": "do not use that thresholds, categories and last actions exclude each other",
@@ -370,7 +370,7 @@ def _options(parsed: argparse.Namespace) -> LearnOptions:
 def _learn(parsed: argparse.Namespace) -> None:
     progress = ProgressBar()
     try:
-        result = learn_and_replay.learn(
+        result = learning_from_files.learn(
             parsed.inputs,
             out=parsed.out,
             options=_options(parsed),
@@ -426,7 +426,7 @@ def _suggestions(learned: LearnedTree) -> Iterator[str]:
         yield f"  {one.id:<{width}}  {shown}  (seen {one.support} times{mark})"
 
 
-def _judgement(result: learn_and_replay.OfflineLearning) -> str:
+def _judgement(result: OfflineLearning) -> str:
     provenance = result.learned.provenance
     figures = provenance.figures
     lines = [

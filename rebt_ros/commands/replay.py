@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rebt_ros.commands.shell import add_input_options, aligned, input_options, parse, run
 from rebt_ros.learning.replaying import Disagreement, Replay
-from rebt_ros.offline import learn_and_replay
+from rebt_ros.offline.replay_over_files import replay
 
 #: Recordings whose rows lie closer have no clock, as CSV tables (seconds).
 _NO_CLOCK = 1e-3
@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _replay(parsed: argparse.Namespace) -> None:
-    results = learn_and_replay.replay(parsed.tree, parsed.inputs, reading=input_options(parsed))
+    results = replay(parsed.tree, parsed.inputs, reading=input_options(parsed))
     for place, result in enumerate(results):
         if place:
             print()

@@ -14,9 +14,9 @@ import heapq
 from dataclasses import dataclass
 
 import numpy as np
-from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.decision_tree.grown import GrownTree
 
 #: Parent of the root, and child of a leaf.
 _NONE = -1
@@ -86,21 +86,17 @@ class PruningPath:
         return standing
 
 
-def pruning_path(classifier: DecisionTreeClassifier) -> PruningPath:
+def pruning_path(grown: GrownTree) -> PruningPath:
     """Prunes the weakest link again and again, as scikit-learn does, and notes when.
 
     A link's weakness is the effective alpha of its node t: how much the impurity of t alone
     exceeds that of its branch, for each leaf that pruning would save.  Takes O(n · depth · log n)
     steps for n nodes.
-
-    Args:
-        classifier: Fitted with ``ccp_alpha=0``.
     """
-    tree = classifier.tree_
-    parents = _parents(tree.children_left, tree.children_right)
-    is_leaf = tree.children_left == _NONE
-    risk = tree.impurity * tree.weighted_n_node_samples / tree.weighted_n_node_samples[0]
-    branch_risk, leaves = np.zeros(tree.node_count), np.zeros(tree.node_count, dtype=np.int64)
+    parents = _parents(grown.left, grown.right)
+    is_leaf = grown.left == _NONE
+    risk = grown.risk
+    branch_risk, leaves = np.zeros(len(grown)), np.zeros(len(grown), dtype=np.int64)
     for leaf in np.flatnonzero(is_leaf):
         node = int(leaf)
         while node != _NONE:
@@ -122,7 +118,7 @@ def pruning_path(classifier: DecisionTreeClassifier) -> PruningPath:
             continue
         # Rounding can make a later link a little weaker than an earlier one, or than nothing.
         reached = max(reached, alpha)
-        for below in _splits_below(node, tree.children_left, tree.children_right, collapse):
+        for below in _splits_below(node, grown.left, grown.right, collapse):
             collapse[below] = reached
             newest.pop(below, None)
         saved_risk, saved_leaves = risk[node] - branch_risk[node], leaves[node] - 1

@@ -12,7 +12,7 @@ from rebt_ros.behavior_tree.shown import (
     ShownValues,
     Span,
 )
-from rebt_ros.decision_tree.training import TrainedTree
+from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rebt_ros.decision_tree.training import FittedTree, fit_again
+from rebt_ros.decision_tree.fitted import FittedTree
+from rebt_ros.decision_tree.training import fit_again
 from rebt_ros.demonstration.table import DemonstrationTable
 
 #: Leaves and rows up to which there is a search.

@@ -15,33 +15,28 @@ Of the trees that fit the rows equally well, the simplest one is taken (see `sim
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, IntArray
-from rebt_ros.behavior_tree import nodes
-from rebt_ros.beyond_the_paper.priority_root import reduced_tree
+from rebt_ros.arrays import BoolArray
 from rebt_ros.decision_tree.differences import likely_differences
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
+from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.simplest import simplest
-from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, part_of
 from rebt_ros.errors import OptionError
-from rebt_ros.learning import evaluation
-from rebt_ros.learning.cross_validation import (
-    MOST_FOLDS,
-    CrossValidation,
-    JudgedLevels,
-    clearly_raised,
-)
+from rebt_ros.learning.chosen_policy import ChosenPolicy
+from rebt_ros.learning.conversion import own_history_choices
+from rebt_ros.learning.cross_validation import MOST_FOLDS, CrossValidation
+from rebt_ros.learning.judged_levels import JudgedLevels, clearly_raised
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.logic.conditions import Difference
-from rebt_ros.paper.re_bt_espresso import main_tree
-from rebt_ros.paper.rules import delta_close, dt_to_rules, dt_to_rules_psa, leaf_rules
+from rebt_ros.paper.rules import delta_close
 
 #: With fewer rows the folds are too small to tell anything.
 _FEWEST_ROWS = 20
@@ -59,22 +54,6 @@ _DEARER, _SMALLER = 0.005, 0.75
 #: Steps of four cross-validations, of running the trees of two, and of running them with PSA nodes
 #: and without.
 _MOST_STEPS = 4 * (MOST_FOLDS + 1) + 2 * MOST_FOLDS + 2 * MOST_FOLDS
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ChosenPolicy:
-    """What was chosen, and why."""
-
-    fitted: FittedTree
-    ccp_alpha: float
-    psa: bool
-    """Whether PSA nodes stand in the tree."""
-    levels: JudgedLevels | None
-    """The pruning levels that were chosen from; None where there was no choice."""
-    reasons: tuple[str, ...]
-    """A sentence for each choice."""
-    of_all: FittedTree | None = None
-    """The tree of all rows, also of those that were held out; None where none was chosen by."""
 
 
 class _Steps:
@@ -166,42 +145,6 @@ def _of_another_fit(
     asked = _asked_for(fitted, options)
     # Its levels lie elsewhere: what was chosen is the range up to the next one.
     return judged.path.middle(ccp_alpha) if asked is None else asked
-
-
-def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.Node:
-    """The behavior tree of a decision tree.
-
-    Raises:
-        OptionError: The root asked for makes no sense.
-    """
-    dt, delta = trained.tree, options.delta
-    if options.reductions is None:
-        return main_tree(dt_to_rules_psa(dt, delta) if psa else dt_to_rules(dt), options.root)
-    rules = leaf_rules(dt, lambda leaf: delta_close(leaf, delta) if psa else (leaf.most_probable,))
-    return reduced_tree(rules, options.reductions, options.root)
-
-
-def own_history_choices(
-    trained: TrainedTree, table: DemonstrationTable, options: LearnOptions, *, psa: bool
-) -> IntArray:
-    """What the behavior tree of a decision tree chooses after its own choices.
-
-    It need not be made, which takes long, unless LAT or PSA nodes come with a history: it chooses
-    what the leaf of the decision tree does, or the best supported one of the leaf's PSA group.
-    """
-    history = trained.vocabulary.history
-    if history is History.LAST or (psa and history is not History.NONE):
-        return evaluation.own_history_choices(convert(trained, options, psa=psa), table)
-    if not psa:
-        return evaluation.decision_tree_choices(trained, table)
-    rules = leaf_rules(trained.tree, lambda leaf: delta_close(leaf, options.delta))
-    place = {action: position for position, action in enumerate(trained.tree.actions)}
-    first = {
-        frozenset(place[one] for one in rule.actions): place[rule.actions[0]] for rule in rules
-    }
-    leaves, of_row = trained.deciding(table)
-    chosen = [first[frozenset(delta_close(leaf, options.delta))] for leaf in leaves]
-    return np.array(chosen, dtype=np.int64)[of_row]
 
 
 def _unjudged(table: DemonstrationTable, options: LearnOptions) -> ChosenPolicy:

@@ -1,38 +1,30 @@
-"""Choosing a pruning level by cross-validation: pruning has to pay.
+"""Cross-validation of pruning levels.
 
 recall
     Of an action: the share of its rows on which a tree takes it, of the rows that it was not
     learned from.
 
 A level is judged by its mean recall over all actions, so that an action that is rare but decisive
-counts as much as a frequent one.  The largest tree is chosen that is not clearly worse than the
-best one: by more than three quarters of a standard error of their difference, fold by fold.  Where
-demonstrators err, large trees are clearly worse, and pruned.  Elsewhere the few rows that decide a
-task stay.
-
-The usual rule of one standard error (Breiman et al., 1984) is another one: it takes the smallest
-tree, and an error that measures how much demonstrations differ instead of how much trees do.
+counts as much as a frequent one (see `judged_levels`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
-from rebt_ros.decision_tree.training import FittedTree, TrainedTree, fit_parts
+from rebt_ros.decision_tree.fitted import FittedTree, TrainedTree
+from rebt_ros.decision_tree.training import fit_parts
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning.evaluation import decision_tree_choices
+from rebt_ros.learning.judged_levels import JudgedLevels
 
 MOST_FOLDS = 5
-#: Standard errors of a difference from which on it is clear.  A difference that a single fold makes
-#: is one standard error large, and clear; one on which folds disagree is not.
-_CLEAR = 0.75
 #: Folds of large tables, each of which has rows enough.
 _FEW_FOLDS, _MANY_ROWS = 3, 8_000
 #: A tree that may test LAT has to be converted and run through the rows to be judged: so many
@@ -42,94 +34,6 @@ _MOST_LEVELS_RUN, _MOST_LEAVES_RUN = 12, 32
 #: What the behavior tree of a pruned decision tree chooses in the rows of a table after its own
 #: choices in the rows before: positions in the table's actions.
 Choices = Callable[[TrainedTree, DemonstrationTable], IntArray]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class JudgedLevels:
-    """Pruning levels with how well the folds' trees do on the rows they were not learned from."""
-
-    ccp_alphas: FloatArray
-    """Ascending, shape (levels,): larger means a smaller tree."""
-    hits: IntArray
-    """Rows of each action on which a level takes it, shape (folds, levels, actions)."""
-    shown: IntArray
-    """Rows of each action, shape (folds, actions)."""
-
-    @property
-    def scores(self) -> FloatArray:
-        """Agreement with the rows of each fold, shape (folds, levels)."""
-        return np.asarray(self.hits.sum(axis=2) / self.shown.sum(axis=1)[:, np.newaxis])
-
-    @property
-    def means(self) -> FloatArray:
-        """Mean agreement of each level, shape (levels,)."""
-        return np.asarray(np.mean(self.scores, axis=0))
-
-    @property
-    def standard_errors(self) -> FloatArray:
-        """Standard error of each mean agreement, shape (levels,)."""
-        return _standard_error(self.scores)
-
-    @property
-    def recalls(self) -> FloatArray:
-        """Recall of each action over all folds, NaN where it was not shown: (levels, actions)."""
-        shown = self.shown.sum(axis=0)
-        with np.errstate(invalid="ignore"):
-            return np.asarray(self.hits.sum(axis=0) / shown)
-
-    @property
-    def mean_recalls(self) -> FloatArray:
-        """Mean recall of the actions at each level, shape (levels,)."""
-        return np.asarray(self.contributions.sum(axis=0))
-
-    @property
-    def best(self) -> int:
-        """The level with the highest mean recall; of equals, the one with the largest tree."""
-        # Sums of the same shares in another order may differ in the last bits.
-        return int(np.argmax(np.round(self.mean_recalls, 12)))
-
-    @property
-    def chosen(self) -> int:
-        """The largest tree that is not clearly worse than the best."""
-        contributions, best = self.contributions, self.best
-        worse = contributions[:, [best]] - contributions
-        clearly = _CLEAR * len(worse) * _standard_error(worse)
-        return int(np.argmax(np.round(worse.sum(axis=0) - clearly, 12) <= 0))
-
-    def at(self, ccp_alpha: float) -> int:
-        """The level that a ``ccp_alpha`` comes to."""
-        return max(int(np.searchsorted(self.ccp_alphas, ccp_alpha, side="right")) - 1, 0)
-
-    @property
-    def contributions(self) -> FloatArray:
-        """What each fold adds to the mean recall, shape (folds, levels)."""
-        shown = self.shown.sum(axis=0)
-        return np.asarray(np.mean(self.hits[..., shown > 0] / shown[shown > 0], axis=2))
-
-
-def clearly_raised(before: JudgedLevels, after: JudgedLevels) -> bool:
-    """Whether the first level's mean recall is clearly higher, fold by fold, in the same folds."""
-    gains = after.contributions[:, :1] - before.contributions[:, :1]
-    clearly = _CLEAR * len(gains) * _standard_error(gains)
-    return bool(np.round(gains.sum(axis=0) - clearly, 12)[0] > 0)
-
-
-def _standard_error(values: FloatArray) -> FloatArray:
-    """Of the mean over the first axis; 0 where there is one value only."""
-    if len(values) < 2:
-        return np.zeros(values.shape[1:])
-    return np.asarray(np.std(values, axis=0, ddof=1) / np.sqrt(len(values)))
-
-
-def mean_recall(hits: IntArray, shown: IntArray) -> FloatArray:
-    """The mean over the actions that were shown of the share of their rows that was hit.
-
-    Args:
-        hits: Rows, shape (..., actions).
-        shown: Of so many, shape (actions,).
-    """
-    occurring = shown > 0
-    return np.asarray(np.mean(hits[..., occurring] / shown[occurring], axis=-1))
 
 
 class CrossValidation:
@@ -211,9 +115,11 @@ class CrossValidation:
     def unpruned(self) -> JudgedLevels:
         """The folds' unpruned trees, after their own choices: one level."""
         unpruned = np.zeros(1)
-        hits = [
-            self._run(place, unpruned, decision_tree_choices) for place in range(len(self._folds))
-        ]
+
+        def choices(trained: TrainedTree, table: DemonstrationTable) -> IntArray:
+            return decision_tree_choices(trained.predict, trained.vocabulary.history, table)
+
+        hits = [self._run(place, unpruned, choices) for place in range(len(self._folds))]
         return self._judged(unpruned, hits)
 
     def own_history_at(self, ccp_alpha: float, choices: Choices) -> float:

@@ -13,12 +13,13 @@ agreement, own-history
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import (
     Plan,
@@ -27,7 +28,6 @@ from rebt_ros.behavior_tree.prediction import (
     choose,
     history_columns,
 )
-from rebt_ros.decision_tree.training import TrainedTree
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
@@ -85,22 +85,30 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
     return np.array(chosen, dtype=np.int64)
 
 
-def decision_tree_choices(trained: TrainedTree, table: DemonstrationTable) -> IntArray:
+def decision_tree_choices(
+    predict: Callable[[DemonstrationTable], IntArray],
+    history: History,
+    table: DemonstrationTable,
+) -> IntArray:
     """What a decision tree chooses in each row after its own choices in the rows before it.
 
     The behavior tree of a decision tree that does not test LAT chooses the same, and takes longer
     to be made.
+
+    Args:
+        predict: What it chooses in each row after what is in the table.
+        history: What it may test of what was done before.
+        table: The rows.
     """
-    match trained.vocabulary.history:
+    match history:
         case History.NONE:
-            return trained.predict(table)
+            return predict(table)
         case History.LAST:
             raise ValueError("LAT depends on the rule that asks, which a decision tree has none of")
     # What is chosen after each action, and in the last line after none.
     befores = [*range(len(table.actions)), NO_ACTION]
     choices = [
-        trained.predict(replace(table, previous=np.full(len(table), before))).tolist()
-        for before in befores
+        predict(replace(table, previous=np.full(len(table), before))).tolist() for before in befores
     ]
     chosen: list[int] = []
     starts = _starts(table)
@@ -116,6 +124,17 @@ def decision_tree_choices(trained: TrainedTree, table: DemonstrationTable) -> In
 def agreement(chosen: IntArray, table: DemonstrationTable) -> float | None:
     """Share of the rows in which `chosen` is what the demonstrator did; None without rows."""
     return float(np.mean(chosen == table.chosen)) if len(table) else None
+
+
+def mean_recall(hits: IntArray, shown: IntArray) -> FloatArray:
+    """The mean over the actions that were shown of the share of their rows that was hit.
+
+    Args:
+        hits: Rows, shape (..., actions).
+        shown: Of so many, shape (actions,).
+    """
+    occurring = shown > 0
+    return np.asarray(np.mean(hits[..., occurring] / shown[occurring], axis=-1))
 
 
 def _situations(tree: nodes.Node, table: DemonstrationTable) -> tuple[DemonstrationTable, IntArray]:

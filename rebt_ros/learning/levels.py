@@ -1,7 +1,7 @@
-"""Every pruning level of the published tree as a learned tree of its own.
+"""What a policy was learned from, and the tree that it gives at each pruning level.
 
-Its figures come from the same level of the tree that was fitted to the rows which were not held
-out, so that each is judged on rows that it was not learned from.
+A level's figures come from the same level of the tree that was fitted to the rows which were not
+held out, so that each is judged on rows that it was not learned from.
 """
 
 from __future__ import annotations
@@ -10,19 +10,79 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rebt_ros.arrays import FloatArray, IntArray
-from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.beyond_the_paper.priority_root import MOST_LEAVES_BY_DOMAIN
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance
+from rebt_ros.beyond_the_paper.reductions import MOST_LEAVES_BY_DOMAIN
+from rebt_ros.decision_tree.fitted import FittedTree, TrainedTree
 from rebt_ros.decision_tree.shown_rows import shown_rows
 from rebt_ros.decision_tree.tree import DecisionTree
+from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
-from rebt_ros.learning.choice import convert
+from rebt_ros.learning import evaluation
+from rebt_ros.learning.attaching import accept
+from rebt_ros.learning.chosen_policy import ChosenPolicy
+from rebt_ros.learning.conversion import convert, own_history_choices
 from rebt_ros.learning.options import LearnOptions
-from rebt_ros.learning.pipeline import Learning, as_learned, figures_of, mismatches, pruned
-from rebt_ros.learning.suggesting import accept
 
 #: The first, the last, the best and the chosen level are always among them.
 FEWEST_LEVELS = 4
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LevelTree:
+    """The tree of a pruning level, without suggestions."""
+
+    learned: LearnedTree
+    decision_tree: TrainedTree
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Evidence:
+    """The rows, and the trees that were fitted to them, with all their pruning levels."""
+
+    table: DemonstrationTable
+    """All rows, lagged features included, late actions moved back."""
+    held_out: BoolArray
+    """Rows that the tree was judged on, shape (rows,)."""
+    fitted: FittedTree
+    """Fitted to the rows that the published tree is learned from."""
+    judge: FittedTree
+    """Fitted to the rows that were not held out: what figures come from."""
+    psa: bool
+    """Whether PSA nodes stand in the trees."""
+    options: LearnOptions
+
+    @property
+    def learned_from(self) -> DemonstrationTable:
+        """The rows that the published tree is learned from."""
+        return self.table if self.options.refit else self.table.where(~self.held_out)
+
+    def decision_tree_at(self, ccp_alpha: float) -> TrainedTree:
+        """The decision tree of a pruning level, with thresholds as the options say."""
+        if self.options.readable_thresholds and self.options.upsample is Upsampling.NONE:
+            return self.fitted.readable_at(ccp_alpha, self.learned_from)
+        return self.fitted.at(ccp_alpha)
+
+    def tree_at(self, ccp_alpha: float, *, judged_at: float | None = None) -> LevelTree:
+        """The behavior tree of a pruning level, with its figures.
+
+        Args:
+            ccp_alpha: The level.
+            judged_at: The level of the tree that figures come from; None for the same.
+        """
+        table = self.learned_from
+        trained = self.decision_tree_at(ccp_alpha)
+        tree = convert(trained, self.options, psa=self.psa)
+        judge = self.judge.at(ccp_alpha if judged_at is None else judged_at)
+        figures = replace(
+            _figures(self.table.where(self.held_out), judge, self.options, self.psa),
+            fidelity_mismatches=mismatches(self.table, trained, tree),
+        )
+        learned = as_learned(table, trained, tree, ccp_alpha, figures, self.options)
+        return LevelTree(replace(learned, shown=(shown_rows(table, trained),)), trained)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,31 +116,31 @@ class Level:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Family:
+class Levels:
     """What is known of all levels before their trees are made."""
 
-    learning: Learning
-    options: LearnOptions
+    evidence: Evidence
+    policy: ChosenPolicy
 
     @property
     def ccp_alphas(self) -> FloatArray:
         """Ascending, shape (levels,)."""
-        return self.learning.policy.fitted.path.alphas
+        return self.evidence.fitted.path.alphas
 
     @property
     def leaves(self) -> IntArray:
         """Leaves of the decision tree at each level, shape (levels,)."""
-        return self.learning.policy.fitted.path.leaf_counts()
+        return self.evidence.fitted.path.leaf_counts()
 
     @property
     def chosen(self) -> int:
         """The level that was chosen, or that the ``ccp_alpha`` asked for comes to."""
-        return _level_of(self.ccp_alphas, self.learning.policy.ccp_alpha)
+        return _level_of(self.ccp_alphas, self.policy.ccp_alpha)
 
     @property
     def best(self) -> int | None:
         """The level with the highest agreement in cross-validation; None where there was none."""
-        judged = self.learning.policy.levels
+        judged = self.policy.levels
         if judged is None:
             return None
         return _level_of(self.ccp_alphas, float(judged.ccp_alphas[judged.best]))
@@ -102,38 +162,26 @@ class Family:
 
     def level(self, number: int) -> Level:
         """Makes the trees of a level."""
-        learning, ccp_alpha = self.learning, float(self.ccp_alphas[number])
-        table = learning.table if self.options.refit else learning.table.where(~learning.held_out)
-        trained = pruned(learning.policy.fitted, ccp_alpha, table, self.options)
-        leaves, chosen = int(self.leaves[number]), number == self.chosen
+        ccp_alpha = float(self.ccp_alphas[number])
+        tree = self.evidence.tree_at(ccp_alpha)
+        leaves = int(self.leaves[number])
         # Suggestions belong to the published tree.
-        whole = convert(trained, self.options, psa=learning.policy.psa)
-        tree, _ = accept(whole, (), replace(self.options, attach=()))
-        figures = replace(
-            figures_of(
-                learning.table.where(learning.held_out),
-                learning.judge.at(ccp_alpha),
-                self.options,
-                learning.policy.psa,
-            ),
-            fidelity_mismatches=mismatches(learning.table, trained, tree),
-        )
-        learned = as_learned(table, trained, tree, ccp_alpha, figures, self.options)
-        ranges = shown_rows(table, trained)
+        options = replace(self.evidence.options, attach=())
+        resolved, _ = accept(tree.learned.tree, (), options)
         return Level(
             number,
             ccp_alpha,
-            trained.tree,
+            tree.decision_tree.tree,
             leaves,
-            replace(learned, shown=(ranges,)),
+            replace(tree.learned, tree=resolved),
             self._cross_validated(ccp_alpha),
-            chosen,
+            number == self.chosen,
             number == self.best,
             leaves <= MOST_LEAVES_BY_DOMAIN,
         )
 
     def _cross_validated(self, ccp_alpha: float) -> CrossValidated | None:
-        judged = self.learning.policy.levels
+        judged = self.policy.levels
         if judged is None:
             return None
         places = np.flatnonzero(judged.ccp_alphas == ccp_alpha)
@@ -144,6 +192,64 @@ class Family:
             figures = (judged.mean_recalls, judged.means, judged.standard_errors)
             return CrossValidated(*(float(one[place]) for one in figures))
         return None
+
+
+def _figures(
+    rows: DemonstrationTable, trained: TrainedTree, options: LearnOptions, psa: bool
+) -> Figures:
+    """How well the behavior tree of a decision tree does on rows that it was not learned from.
+
+    Of fidelity nothing is said: that is about the tree that is published (see `mismatches`).
+    """
+    if not len(rows):
+        return Figures(0, None, None, 0)
+    forced = trained.predict(rows)
+    if psa or trained.vocabulary.history is History.LAST:
+        tree = convert(trained, options, psa=psa)
+        forced = evaluation.teacher_forced_choices(tree, rows)
+    own = own_history_choices(trained, rows, options, psa=psa)
+    shown = np.bincount(rows.chosen, minlength=len(rows.actions))
+    hits = np.bincount(rows.chosen[own == rows.chosen], minlength=len(rows.actions))
+    return Figures(
+        0,
+        evaluation.agreement(forced, rows),
+        evaluation.agreement(own, rows),
+        len(rows),
+        float(evaluation.mean_recall(hits, shown)),
+    )
+
+
+def as_learned(
+    table: DemonstrationTable,
+    trained: TrainedTree,
+    tree: nodes.Node,
+    ccp_alpha: float,
+    figures: Figures,
+    options: LearnOptions,
+) -> LearnedTree:
+    """A behavior tree with where it came from."""
+    return LearnedTree(
+        table.features,
+        evaluation.actions_of(table),
+        tree,
+        Provenance(
+            demonstrations=len(np.unique(table.demonstration)),
+            rows=len(table),
+            delta=options.delta,
+            max_depth=options.max_depth,
+            ccp_alpha=ccp_alpha,
+            root=options.root,
+            history=trained.vocabulary.history,
+            figures=figures,
+        ),
+        row_kind=table.row_kind,
+    )
+
+
+def mismatches(table: DemonstrationTable, trained: TrainedTree, tree: nodes.Node) -> int:
+    """Rows on which a behavior tree chooses something else than its decision tree."""
+    chosen = evaluation.teacher_forced_choices(tree, table)
+    return int(np.sum(chosen != trained.predict(table)))
 
 
 def check_most_levels(most: int) -> None:

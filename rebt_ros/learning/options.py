@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from rebt_ros.behavior_tree.learned_tree import Root
-from rebt_ros.beyond_the_paper.priority_root import ALL_REDUCTIONS, Reductions
+from rebt_ros.beyond_the_paper.reductions import ALL_REDUCTIONS, Reductions
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import LARGEST_LAG
 from rebt_ros.errors import OptionError
-from rebt_ros.learning.suggestions import PsaChoice
+
+#: Stands for the ids of all suggestions.
+ALL = "all"
 
 #: No one reacts later than that (seconds).
 _LATEST = 5.0
@@ -26,6 +28,15 @@ class Use(Enum):
     """Only where cross-validation speaks for it (see `choosing`)."""
     ALWAYS = "always"
     NEVER = "never"
+
+
+class PsaChoice(Enum):
+    """What a PSA node is turned into."""
+
+    SELECTOR = "selector"
+    """Its actions are alternatives, the best supported first."""
+    PARALLEL = "parallel"
+    """Its actions are run together."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,44 +15,24 @@ from rebt_ros.behavior_tree.learned_tree import (
     LearnedTree,
     Provenance,
 )
-from rebt_ros.beyond_the_paper.priority_root import MOST_LEAVES_IN_BEST_ORDER, MOST_LEAVES_MINIMIZED
-from rebt_ros.decision_tree.shown_rows import shown_rows
-from rebt_ros.decision_tree.training import FittedTree, TrainedTree
-from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.beyond_the_paper.reductions import MOST_LEAVES_IN_BEST_ORDER, MOST_LEAVES_MINIMIZED
+from rebt_ros.beyond_the_paper.routines.finding import find_routines
+from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.demonstration.lags import evenly_spaced, with_lags
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, OptionError
-from rebt_ros.learning import evaluation
-from rebt_ros.learning.choice import ChosenPolicy, choose, convert, own_history_choices
-from rebt_ros.learning.cross_validation import mean_recall
-from rebt_ros.learning.options import DEFAULTS, LearnOptions
-from rebt_ros.learning.reaction_time import ReactionTime, estimate, given, shifted
-from rebt_ros.learning.report import LearningReport, report_on
-from rebt_ros.learning.suggesting import accept, routines_of, suggest
-from rebt_ros.learning.suggestions import ALL
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Learning:
-    """A learned tree beside what it was made from."""
-
-    learned: LearnedTree
-    decision_tree: TrainedTree
-    table: DemonstrationTable
-    held_out: BoolArray
-    """Rows that the tree was judged on, shape (rows,)."""
-    policy: ChosenPolicy
-    """What was chosen to learn, and why."""
-    judge: FittedTree
-    """Fitted to the rows that were not held out: what figures come from."""
-    report: LearningReport
-    """What a person must know about it."""
-    notes: tuple[str, ...] = ()
-    """What a person should know about it; no full stops."""
-
+from rebt_ros.learning.choice import choose
+from rebt_ros.learning.chosen_policy import ChosenPolicy
+from rebt_ros.learning.late_actions import shifted
+from rebt_ros.learning.learning import Learning, learned_as_asked
+from rebt_ros.learning.levels import Evidence
+from rebt_ros.learning.options import ALL, DEFAULTS, LearnOptions
+from rebt_ros.learning.progress import Progress
+from rebt_ros.learning.reaction_time import ReactionTime, estimate, given
+from rebt_ros.learning.suggesting import suggest
 
 _UNEVEN = (
     "the rows of channel {!r} are not evenly spaced, so that a row back is now more, now less time "
@@ -72,9 +52,6 @@ _CHOSEN_FROM_ALL = 5_000
 
 #: Where of all the work choosing and judging begin.
 _CHOOSING, _JUDGING = 0.1, 0.8
-
-#: Told what is being done and which share of the work is behind.
-Progress = Callable[[str, float], None]
 
 
 def learn(
@@ -217,41 +194,26 @@ def learn_from(
     table = with_lags(table, options.lags)
     held_out = table.held_out(options.test_fraction)
     judged, policy = _chosen(table, held_out, options, progress)
-    learned_from = table if options.refit else table.where(~held_out)
-    judge = judged.fitted
+    evidence = Evidence(table, held_out, policy.fitted, judged.fitted, policy.psa, options)
     ccp_alpha = judged.ccp_alpha if options.level is None else policy.ccp_alpha
-    figures = figures_of(table.where(held_out), judge.at(ccp_alpha), options, policy.psa)
-    trained = pruned(policy.fitted, policy.ccp_alpha, learned_from, options)
-    whole = convert(trained, options, psa=policy.psa)
+    plain = evidence.tree_at(policy.ccp_alpha, judged_at=ccp_alpha)
     progress("suggesting", 0.9)
-    routines = routines_of(learned_from, options)
+    learned_from, trained = evidence.learned_from, plain.decision_tree
+    routines = find_routines(learned_from) if options.routines else ()
     suggestions, notes = suggest(learned_from, trained, policy.ccp_alpha, options, routines)
-    tree, suggestions = accept(whole, suggestions, options)
-    figures = replace(figures, fidelity_mismatches=mismatches(table, trained, whole))
-    learned = as_learned(learned_from, trained, tree, policy.ccp_alpha, figures, options)
-    provenance = replace(
-        learned.provenance, late_rows=late.rows, late_seconds=late.seconds if late.rows else None
+    learned = replace(
+        plain.learned, suggestions=suggestions, provenance=_late(plain.learned.provenance, late)
     )
-    ranges = shown_rows(learned_from, trained)
-    history = trained.vocabulary.history
-    report = report_on(learned_from, tree, history, policy.levels, policy.ccp_alpha)
-    progress("done", 1.0)
-    return Learning(
-        replace(learned, provenance=provenance, suggestions=suggestions, shown=(ranges,)),
+    learning = learned_as_asked(
+        learned,
         trained,
-        table,
-        held_out,
         policy,
-        judge,
-        report,
-        (
-            *((late.sentence,) if late.rows else ()),
-            *report.notes(),
-            *trained.notes,
-            *notes,
-            *_cautions(table, trained, options),
-        ),
+        evidence,
+        late=(late.sentence,) if late.rows else (),
+        further=(*trained.notes, *notes, *_cautions(table, trained, options)),
     )
+    progress("done", 1.0)
+    return learning
 
 
 def _chosen(
@@ -291,6 +253,11 @@ def reaction_time_of(table: DemonstrationTable, options: LearnOptions) -> Reacti
     return estimate(table)
 
 
+def _late(provenance: Provenance, late: ReactionTime) -> Provenance:
+    seconds = late.seconds if late.rows else None
+    return replace(provenance, late_rows=late.rows, late_seconds=seconds)
+
+
 def _of_all(policy: ChosenPolicy, options: LearnOptions) -> ChosenPolicy:
     """A policy of all rows, as chosen from those that were not held out."""
     assert policy.of_all is not None
@@ -299,22 +266,6 @@ def _of_all(policy: ChosenPolicy, options: LearnOptions) -> ChosenPolicy:
         # The levels of another fit lie elsewhere: what was chosen is the range up to the next one.
         ccp_alpha = policy.fitted.path.middle(ccp_alpha)
     return replace(policy, fitted=policy.of_all, ccp_alpha=ccp_alpha)
-
-
-def pruned(
-    fitted: FittedTree, ccp_alpha: float, table: DemonstrationTable, options: LearnOptions
-) -> TrainedTree:
-    """The decision tree of a pruning level, with thresholds as the options say.
-
-    Args:
-        fitted: The tree.
-        ccp_alpha: The level.
-        table: What it was fitted to.
-        options: How to learn.
-    """
-    if options.readable_thresholds and options.upsample is Upsampling.NONE:
-        return fitted.readable_at(ccp_alpha, table)
-    return fitted.at(ccp_alpha)
 
 
 def _cautions(
@@ -330,64 +281,6 @@ def _cautions(
         yield _LARGE.format(table.channel, leaves)
     else:
         yield _VERY_LARGE.format(table.channel, leaves)
-
-
-def figures_of(
-    rows: DemonstrationTable, trained: TrainedTree, options: LearnOptions, psa: bool
-) -> Figures:
-    """How well the behavior tree of a decision tree does on rows that it was not learned from.
-
-    Of fidelity nothing is said: that is about the tree that is published (see `mismatches`).
-    """
-    if not len(rows):
-        return Figures(0, None, None, 0)
-    forced = trained.predict(rows)
-    if psa or trained.vocabulary.history is History.LAST:
-        tree = convert(trained, options, psa=psa)
-        forced = evaluation.teacher_forced_choices(tree, rows)
-    own = own_history_choices(trained, rows, options, psa=psa)
-    shown = np.bincount(rows.chosen, minlength=len(rows.actions))
-    hits = np.bincount(rows.chosen[own == rows.chosen], minlength=len(rows.actions))
-    return Figures(
-        0,
-        evaluation.agreement(forced, rows),
-        evaluation.agreement(own, rows),
-        len(rows),
-        float(mean_recall(hits, shown)),
-    )
-
-
-def as_learned(
-    table: DemonstrationTable,
-    trained: TrainedTree,
-    tree: nodes.Node,
-    ccp_alpha: float,
-    figures: Figures,
-    options: LearnOptions,
-) -> LearnedTree:
-    """A behavior tree with where it came from."""
-    return LearnedTree(
-        table.features,
-        evaluation.actions_of(table),
-        tree,
-        Provenance(
-            demonstrations=len(np.unique(table.demonstration)),
-            rows=len(table),
-            delta=options.delta,
-            max_depth=options.max_depth,
-            ccp_alpha=ccp_alpha,
-            root=options.root,
-            history=trained.vocabulary.history,
-            figures=figures,
-        ),
-        row_kind=table.row_kind,
-    )
-
-
-def mismatches(table: DemonstrationTable, trained: TrainedTree, tree: nodes.Node) -> int:
-    """Rows on which a behavior tree chooses something else than its decision tree."""
-    chosen = evaluation.teacher_forced_choices(tree, table)
-    return int(np.sum(chosen != trained.predict(table)))
 
 
 def summary_sentence(learned: LearnedTree) -> str:

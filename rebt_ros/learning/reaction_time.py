@@ -28,16 +28,14 @@ from rebt_ros.arrays import IntArray
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.lags import evenly_spaced
-from rebt_ros.demonstration.last_action import NO_ACTION, History, previous_actions
+from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.errors import OptionError
+from rebt_ros.learning.late_actions import places, row_gap, rows_in
 
 #: Reactions take up to 0.5 s; a peak is seen only where there is a later delay to compare with.
 _LATEST = 0.6
 #: Delays up to that many rows are tried where stamps tell no time.
 _MOST_ROWS = 6
-#: Stamps closer to each other than that are numbers of rows (nanoseconds).
-_NO_TIME = 1_000
 #: Delays lose the first rows of each demonstration: at most this share of the usual one.
 _LOST = 1 / 3
 #: Delays that are tried at first; between them, only those around the best are.
@@ -88,63 +86,6 @@ class ReactionTime:
         return self.rows > 0
 
 
-def shifted(table: DemonstrationTable, rows: int) -> DemonstrationTable:
-    """The table with actions moved back to the states that they are answers to.
-
-    Row t gets the action of row t + `rows` of its demonstration; the last rows, which then have no
-    action, are left out, and so are demonstrations that have no others.  What was done before each
-    row is derived from the moved actions; where something was done before a demonstration began,
-    LAT of its first row still knows about that.
-
-    Args:
-        table: Rows of one channel, in whole demonstrations.
-        rows: The delay, 0 or more.
-
-    Raises:
-        OptionError: No demonstration is longer than the delay.
-    """
-    if not rows:
-        return table
-    place, length = _places(table)
-    has_action = place < length - rows
-    if not has_action.any():
-        raise OptionError(
-            f"no demonstration is longer than a reaction time of {rows} rows: give a shorter one."
-        )
-    states = table.where(has_action)
-    before = table.before
-    if before is not None:
-        shown, first = np.unique(states.demonstration, return_index=True)
-        moved = np.full_like(before, NO_ACTION)
-        moved[shown] = table.last[np.flatnonzero(has_action)[first] + rows]
-        before = np.where(before == NO_ACTION, NO_ACTION, moved)
-    chosen = table.chosen[np.flatnonzero(has_action) + rows]
-    previous = previous_actions(chosen, states.demonstration)
-    return replace(states, chosen=chosen, before=before, previous=previous)
-
-
-def tells_time(table: DemonstrationTable) -> bool:
-    """Whether the stamps are more than numbers of rows."""
-    return _gap(table) is not None
-
-
-def rows_in(table: DemonstrationTable, seconds: float) -> int:
-    """How many rows a time is, to the nearest one.
-
-    Raises:
-        OptionError: The table's stamps tell no time.
-    """
-    gap = _gap(table)
-    if not seconds:
-        return 0
-    if gap is None:
-        raise OptionError(
-            "a reaction time in seconds needs rows with stamps: give the table a column 'stamp' "
-            "(nanoseconds)."
-        )
-    return round(seconds / gap)
-
-
 def given(table: DemonstrationTable, seconds: float) -> ReactionTime:
     """A reaction time that a person says.
 
@@ -180,7 +121,7 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
     Returns:
         Deterministic; a delay of 0 where there is nothing to compare.
     """
-    gap = _gap(table)
+    gap = row_gap(table)
     why_not, most = _most(table, gap)
     if why_not:
         return ReactionTime(0, _seconds(0, gap), why_not)
@@ -199,20 +140,6 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
 
 
 _NOT_LATE = "no reaction time shows: actions are learned as of when they were taken"
-
-
-def _places(table: DemonstrationTable) -> tuple[IntArray, IntArray]:
-    """Each row's place in its demonstration and the rows of that, both of shape (rows,)."""
-    first = np.searchsorted(table.demonstration, table.demonstration)
-    end = np.searchsorted(table.demonstration, table.demonstration, side="right")
-    return np.arange(len(table)) - first, end - first
-
-
-def _gap(table: DemonstrationTable) -> float | None:
-    """Seconds from a row to the next; None where stamps tell no time."""
-    gaps = np.diff(table.stamps)[np.diff(table.demonstration) == 0]
-    gap = float(np.median(gaps)) if len(gaps) else 0.0
-    return gap / 1e9 if gap > _NO_TIME else None
 
 
 def _seconds(rows: int, gap: float | None) -> float | None:
@@ -241,7 +168,7 @@ class _Explanations:
     def __init__(self, table: DemonstrationTable, most: int) -> None:
         self._table = table
         self._most = most
-        place, _ = _places(table)
+        place, _ = places(table)
         # Rows whose state and previous action are known whatever the delay is.
         self._rows = _stretches(np.flatnonzero(place >= most))
 

@@ -17,7 +17,7 @@ from rebt_ros.demonstration.schema import TRUTH, Feature, FeatureKind, number_of
 from rebt_ros.demonstration.table import DemonstrationTable, category, tabulate
 from rebt_ros.errors import InputError
 from rebt_ros.learning import evaluation
-from rebt_ros.learning.reaction_time import rows_in, shifted, tells_time
+from rebt_ros.learning.late_actions import rows_in, shifted, tells_time
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from rebt_ros.arrays import IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.learning.cross_validation import JudgedLevels
+from rebt_ros.learning.judged_levels import JudgedLevels
 
 #: How well agreement in cross-validation ranks the trees of one task by their success (Spearman's
 #: rho): 0.6 where trees of the same demonstrations were compared, 0.2 over sets and numbers of

@@ -3,32 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import replace
 
 import numpy as np
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Suggestion
-from rebt_ros.beyond_the_paper.priority_root import MOST_LEAVES_MINIMIZED
-from rebt_ros.beyond_the_paper.routines.finding import FoundRoutine, find_routines
+from rebt_ros.beyond_the_paper.reductions import MOST_LEAVES_MINIMIZED
+from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
 from rebt_ros.beyond_the_paper.single_loops import loop_trees
 from rebt_ros.decision_tree.encoding import Vocabulary
-from rebt_ros.decision_tree.training import TrainedTree, fit
+from rebt_ros.decision_tree.fitted import TrainedTree
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, part_of
 from rebt_ros.learning.options import LearnOptions
-from rebt_ros.learning.suggestions import (
-    attach,
-    going_on_after_loops,
-    lat_suggestions,
-    mark,
-    psa_suggestions,
-    resolve,
-    routine_suggestions,
-)
+from rebt_ros.learning.suggestions import lat_suggestions, psa_suggestions, routine_suggestions
 from rebt_ros.paper.lat_occurrences import Occurrences, rows
 from rebt_ros.paper.lat_trees import gen_lat_trees
-from rebt_ros.paper.re_bt_espresso import build_inv_set, logic_minimizer, reduce_floats
+from rebt_ros.paper.rule_trees import build_inv_set, logic_minimizer, reduce_floats
 from rebt_ros.paper.rules import dt_to_rules_psa
 
 #: More than a person wants to look through, and how many of them may be routines.
@@ -47,11 +39,6 @@ _TOO_LARGE = (
 _MOST_ROWS = 100_000
 #: Rows that the LAT-augmented tree is fitted to.
 _MOST_ROWS_FITTED = 5_000
-
-
-def routines_of(table: DemonstrationTable, options: LearnOptions) -> tuple[FoundRoutine, ...]:
-    """Routines in a table, if they are asked for; they are the same at all pruning levels."""
-    return find_routines(table) if options.routines else ()
 
 
 def occurrences_in(table: DemonstrationTable) -> Occurrences:
@@ -77,7 +64,7 @@ def suggest(
         trained: The decision tree of the main tree.
         ccp_alpha: How far the LAT-augmented decision tree is pruned.
         options: How to learn.
-        routines: What `routines_of` found in the table.
+        routines: What `find_routines` found in the table.
         occurrences: What `occurrences_in` makes of the table, which saves time where several
             trees are learned from it.
 
@@ -162,26 +149,3 @@ def _of_rules(
     offered = (*psa_suggestions(psa_rules), *lat_suggestions((*lat.trees, *loops.trees)))
     left_out = lat.left_out.paths + loops.left_out
     return offered, frozenset(tree.subtree for tree in loops.trees), left_out
-
-
-def accept(
-    tree: nodes.Node, suggestions: tuple[Suggestion, ...], options: LearnOptions
-) -> tuple[nodes.Node, tuple[Suggestion, ...]]:
-    """The tree with what the user attaches, its PSA nodes as the user wants them.
-
-    In the paper's mode subtrees are attached as printed.  Otherwise they come before the rules,
-    which cover every state, and a Sequence goes on when a loop in it has ended.
-
-    Raises:
-        OptionError: There is no suggestion with such an id.
-    """
-    if options.attach:
-        printed = options.is_paper
-        runnable = tuple(
-            one if printed else replace(one, subtree=going_on_after_loops(one.subtree))
-            for one in suggestions
-        )
-        tree = attach(tree, runnable, options.attach, root=options.root, in_front=not printed)
-    if options.psa_choice is not None:
-        tree = resolve(tree, options.psa_choice)
-    return tree, mark(suggestions, options.attach)

@@ -23,8 +23,8 @@ from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.live.learning_process import Lesson, Progress, Request
 
 if TYPE_CHECKING:
-    from rebt_ros.learning.pipeline import Learning
-    from rebt_ros.offline.learn_and_replay import OfflineLearning
+    from rebt_ros.learning.learning import Learning
+    from rebt_ros.offline.result import OfflineLearning
 
 #: Of all the work, what reading the recordings is.
 _READING: Final = 0.1
@@ -127,7 +127,7 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
     from rebt_ros.demonstration.table import tabulate
     from rebt_ros.learning import pipeline
     from rebt_ros.learning.options import LearnOptions, Use
-    from rebt_ros.offline import learn_and_replay
+    from rebt_ros.offline.result import OfflineLearning
     from rebt_ros.storage.recording import read_recording, recordings
 
     twice = set(request.binary_features) & set(request.categorical_features)
@@ -178,7 +178,7 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
             for name, value in one.figures().items()
         },
         learned.provenance.figures.own_history_agreement,
-        _files(learn_and_replay.OfflineLearning(learned, learnings, tuple(notes))),
+        _files(OfflineLearning(learned, learnings, tuple(notes))),
         _agreement_of(request.published, learnings),
     )
 
@@ -188,9 +188,9 @@ def _files(result: OfflineLearning) -> dict[str, str]:
     from rebt_ros.drawing.dot import render_dot
     from rebt_ros.drawing.svg import render_svg
     from rebt_ros.drawing.text import render_text
-    from rebt_ros.offline import learn_and_replay
+    from rebt_ros.offline.result import summarize
 
-    summary = learn_and_replay.summarize(result) | {"notes": list(result.notes)}
+    summary = summarize(result) | {"notes": list(result.notes)}
     return {
         "tree.txt": render_text(result.learned),
         "tree.svg": render_svg(result.learned),
@@ -209,7 +209,7 @@ def _agreement_of(document: str, learnings: Sequence[Learning]) -> float | None:
     published = loads(document)
     agreeing = rows = 0.0
     for learning in learnings:
-        held_out = learning.table.where(learning.held_out)
+        held_out = learning.table.where(learning.evidence.held_out)
         agreement = agreement_on(published, held_out)
         if agreement is None:
             return None

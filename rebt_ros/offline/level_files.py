@@ -1,4 +1,4 @@
-"""The files of learned trees and of their families.
+"""The files of learned trees and of their pruning levels.
 
 A directory describes one learning: pictures and levels of an earlier one do not stay beside it.
 """
@@ -25,8 +25,9 @@ from rebt_ros.drawing.dot import render_dot
 from rebt_ros.drawing.errors import PictureError
 from rebt_ros.drawing.svg import render_svg
 from rebt_ros.drawing.tree_png import render_decision_tree_png, render_png
-from rebt_ros.learning.levels import Family, Level
-from rebt_ros.learning.pipeline import Learning, Progress
+from rebt_ros.learning.learning import Learning
+from rebt_ros.learning.levels import Level, Levels
+from rebt_ros.learning.progress import Progress
 from rebt_ros.storage.atomic import write_bytes_atomically, write_text_atomically
 from rebt_ros.storage.tree_file import write_tree
 
@@ -34,7 +35,7 @@ _LEVELS, _SUMMARY = "levels", "summary.json"
 _PLOT = "accuracy_vs_alpha"
 #: Longest directory of a channel (characters); its name in full is in the documents.
 _LONGEST_NAME = 100
-#: Families that take more room say so.
+#: Levels that take more room say so.
 _MENTIONED_MEGABYTES = 50
 _LEVEL_FILES = (
     "tree.json",
@@ -89,12 +90,12 @@ def channel_directories(learnings: Sequence[Learning]) -> Iterator[tuple[Path, L
         yield Path("channels", name), learning
 
 
-def write_family(directory: Path, family: Family, most: int, progress: Progress) -> list[str]:
+def write_levels(directory: Path, levels: Levels, most: int, progress: Progress) -> list[str]:
     """Writes levels/NN/ for each pruning level, levels/summary.json and the plot.
 
     Args:
         directory: Where to.
-        family: Of the tree that was learned.
+        levels: Of the tree that was learned.
         most: Levels to write at most.
         progress: Told what is being done and which share of the work is behind.
 
@@ -105,14 +106,14 @@ def write_family(directory: Path, family: Family, most: int, progress: Progress)
         OptionError: `most` is too small.
         StorageError: A file cannot be written.
     """
-    numbers = family.selected(most)
-    clear_family(directory)
-    width = max(2, len(str(len(family.ccp_alphas) - 1)))
-    notes = list(_selection_notes(family, numbers))
+    numbers = levels.selected(most)
+    clear_levels(directory)
+    width = max(2, len(str(len(levels.ccp_alphas) - 1)))
+    notes = list(_selection_notes(levels, numbers))
     entries, simpler = [], 0
     for place, number in enumerate(numbers):
         progress(f"level {place + 1} of {len(numbers)}", place / len(numbers))
-        level = family.level(number)
+        level = levels.level(number)
         name = f"{number:0{width}d}"
         notes += write_behavior_tree(directory / _LEVELS / name, level.learned)
         notes += write_decision_tree(directory / _LEVELS / name, level.decision_tree)
@@ -125,26 +126,26 @@ def write_family(directory: Path, family: Family, most: int, progress: Progress)
         )
     text = json.dumps(entries, indent=2, ensure_ascii=False)
     write_text_atomically(directory / _LEVELS / _SUMMARY, text + "\n")
-    notes += _write_plot(directory, family)
+    notes += _write_plot(directory, levels)
     megabytes = _size(directory / _LEVELS) / 1e6
     if megabytes > _MENTIONED_MEGABYTES:
         notes.append(f"the levels take {megabytes:.0f} MB; a smaller --most-levels takes less")
     return list(dict.fromkeys(notes))
 
 
-def clear_family(directory: Path) -> None:
-    """Takes away the family that an earlier learning wrote here, and nothing else."""
-    levels = directory / _LEVELS
+def clear_levels(directory: Path) -> None:
+    """Takes away the levels that an earlier learning wrote here, and nothing else."""
+    written = directory / _LEVELS
     for form in PlotFormat:
         (directory / f"{_PLOT}.{form.value}").unlink(missing_ok=True)
-    if levels.is_dir():
-        for level in levels.iterdir():
+    if written.is_dir():
+        for level in written.iterdir():
             if level.name.isdecimal() and level.is_dir():
                 for name in _LEVEL_FILES:
                     (level / name).unlink(missing_ok=True)
                 _remove_if_empty(level)
-        (levels / _SUMMARY).unlink(missing_ok=True)
-        _remove_if_empty(levels)
+        (written / _SUMMARY).unlink(missing_ok=True)
+        _remove_if_empty(written)
 
 
 def _size(directory: Path) -> int:
@@ -178,8 +179,8 @@ def _entry(name: str, level: Level) -> dict[str, Any]:
     }
 
 
-def _selection_notes(family: Family, numbers: tuple[int, ...]) -> Iterator[str]:
-    count = len(family.ccp_alphas)
+def _selection_notes(levels: Levels, numbers: tuple[int, ...]) -> Iterator[str]:
+    count = len(levels.ccp_alphas)
     if len(numbers) < count:
         yield (
             f"{len(numbers)} of {count} pruning levels were written, evenly spread, and "
@@ -187,8 +188,8 @@ def _selection_notes(family: Family, numbers: tuple[int, ...]) -> Iterator[str]:
         )
 
 
-def _write_plot(directory: Path, family: Family) -> list[str]:
-    policy = family.learning.policy
+def _write_plot(directory: Path, levels: Levels) -> list[str]:
+    policy = levels.policy
     judged = policy.levels
     if judged is None:
         return [f"there is no {_PLOT}, as there were too few rows for cross-validation"]
@@ -197,7 +198,7 @@ def _write_plot(directory: Path, family: Family) -> list[str]:
         judged.means,
         judged.standard_errors,
         # The levels of another fit may have been judged: each comes to one of this tree.
-        family.leaves[np.searchsorted(family.ccp_alphas, judged.ccp_alphas, side="right") - 1],
+        levels.leaves[np.searchsorted(levels.ccp_alphas, judged.ccp_alphas, side="right") - 1],
         policy.ccp_alpha,
     )
     notes: list[str] = []

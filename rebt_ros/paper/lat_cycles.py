@@ -18,7 +18,7 @@ import networkx as nx
 import numpy as np
 import numpy.typing as npt
 
-from rebt_ros.paper.lat_graph import CycleNode, GraphNode, LatGraph
+from rebt_ros.paper.lat_nodes import CycleNode, GraphNode, LatGraph
 from rebt_ros.paper.lat_occurrences import Occurrences
 
 #: Deepest nesting of cycles in a cycle node; what is nested deeper helps no reader.

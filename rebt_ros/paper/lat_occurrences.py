@@ -24,7 +24,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.paper.lat_graph import ActionNode, GraphNode
+from rebt_ros.paper.lat_nodes import ActionNode, GraphNode
 
 _Found = TypeVar("_Found")
 
@@ -58,7 +58,7 @@ def rows(table: DemonstrationTable) -> Runs:
 class Occurrences:
     """Finds paths of graph nodes in demonstrations.
 
-    >>> from rebt_ros.paper.lat_graph import CycleNode
+    >>> from rebt_ros.paper.lat_nodes import CycleNode
     >>> from rebt_ros.behavior_tree.nodes import Action
     >>> go, turn = (ActionNode((Action(label, "action"),)) for label in ("go", "turn"))
     >>> shown = Occurrences((("turn", "go", "turn", "go", "stop"), ("go", "turn")))

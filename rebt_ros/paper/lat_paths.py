@@ -13,7 +13,7 @@ from itertools import islice, takewhile
 
 import networkx as nx
 
-from rebt_ros.paper.lat_graph import ActionNode, GraphNode, LatGraph
+from rebt_ros.paper.lat_nodes import ActionNode, GraphNode, LatGraph
 from rebt_ros.paper.lat_occurrences import Occurrences
 
 

@@ -31,13 +31,8 @@ from rebt_ros.logic.dnf import Conjunction, Dnf
 from rebt_ros.logic.factoring import pull_out_common
 from rebt_ros.logic.float_reduction import float_reduction
 from rebt_ros.paper.lat_cycles import CycleStart, remove_cycles
-from rebt_ros.paper.lat_graph import (
-    ActionNode,
-    CycleNode,
-    GraphNode,
-    generate_graph,
-    last_action,
-)
+from rebt_ros.paper.lat_graph import generate_graph, last_action
+from rebt_ros.paper.lat_nodes import ActionNode, CycleNode, GraphNode
 from rebt_ros.paper.lat_occurrences import Occurrences, Runs
 from rebt_ros.paper.lat_paths import source_to_sink_paths
 from rebt_ros.paper.rule_trees import action_tree, condition_trees

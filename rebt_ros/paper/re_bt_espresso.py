@@ -12,18 +12,24 @@ same behavior from the same rules.  `LearnOptions.paper()` asks for Algorithm 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.tree import DecisionTree
-from rebt_ros.logic import factoring, float_reduction, inverses, minimize
-from rebt_ros.logic.conditions import Literal
+from rebt_ros.logic import factoring
 from rebt_ros.paper.lat_occurrences import Runs
 from rebt_ros.paper.lat_trees import LatTrees, gen_lat_trees
-from rebt_ros.paper.rule_trees import rule_tree, with_root
-from rebt_ros.paper.rules import FactoredRule, Rule, dt_to_rules, dt_to_rules_psa
+from rebt_ros.paper.rule_trees import (
+    FactoredRule,
+    build_inv_set,
+    logic_minimizer,
+    pullout_common,
+    reduce_floats,
+    rule_tree,
+    with_root,
+)
+from rebt_ros.paper.rules import dt_to_rules, dt_to_rules_psa
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,46 +62,8 @@ def re_bt_espresso(dt: DecisionTree, shown: Runs = (), *, delta: float = 0.3) ->
     return MainAndLatTrees(root, lat_trees)  # lines 30 to 33
 
 
-def main_tree(rules: Iterable[Rule], root: Root = Root.PARALLEL) -> nodes.Node:
-    """Lines 3 to 28: the tree of rules that may be those of single actions, under any root.
-
-    A memoryless Selector root, which the paper allows for, can be executed when actions take longer
-    than a tick: a Parallel fails as soon as one child fails.
-
-    Args:
-        rules: From `dt_to_rules_psa`, or from `dt_to_rules` where PSA nodes are offered as SAES.
-        root: Kind of the root node.
-    """
-    rules = tuple(rules)
-    inv_set = build_inv_set(rules)
-    factored = pullout_common(reduce_floats(logic_minimizer(rules)))
-    return with_root(root, [rule_tree(rule, inv_set) for rule in factored])
-
-
 def bt_espresso(dt: DecisionTree) -> nodes.Node:
     """The baseline: most probable actions, no Inverters, no reductions (French et al., 2019)."""
     rules = logic_minimizer(dt_to_rules(dt))
     unfactored = [FactoredRule(rule.actions, factoring.unfactored(rule.dnf)) for rule in rules]
     return with_root(Root.PARALLEL, [rule_tree(rule, frozenset()) for rule in unfactored])
-
-
-def build_inv_set(rules: Iterable[Rule]) -> frozenset[Literal]:
-    """BUILD_INV_SET: literals to be shown as the inverse of another one."""
-    return inverses.build_inv_set(rule.dnf for rule in rules)
-
-
-def logic_minimizer(rules: Iterable[Rule]) -> tuple[Rule, ...]:
-    """LOGIC_MINIMIZER: the rules with espresso's DNFs."""
-    return tuple(Rule(one.actions, minimize.minimize(one.dnf), one.support) for one in rules)
-
-
-def reduce_floats(rules: Iterable[Rule]) -> tuple[Rule, ...]:
-    """FLOAT_REDUCTION: the rules without subsumed thresholds."""
-    return tuple(
-        Rule(one.actions, float_reduction.float_reduction(one.dnf), one.support) for one in rules
-    )
-
-
-def pullout_common(rules: Iterable[Rule]) -> tuple[FactoredRule, ...]:
-    """PULLOUT_COMMON: the rules with the literals that all their conjunctions share in front."""
-    return tuple(FactoredRule(one.actions, factoring.pull_out_common(one.dnf)) for one in rules)

@@ -1,15 +1,63 @@
-"""Lines 7 to 28 of Algorithm 1: rules as trees, and a root over them."""
+"""The steps of Algorithm 1: from rules to a tree (lines 3 to 28)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.errors import OptionError
+from rebt_ros.logic import factoring, float_reduction, inverses, minimize
 from rebt_ros.logic.conditions import Literal
 from rebt_ros.logic.factoring import Factored
-from rebt_ros.paper.rules import FactoredRule
+from rebt_ros.paper.rules import Rule
+
+
+@dataclass(frozen=True, slots=True)
+class FactoredRule:
+    """A rule whose DNF has been factored."""
+
+    actions: tuple[nodes.Action, ...]
+    condition: Factored
+
+
+def main_tree(rules: Iterable[Rule], root: Root = Root.PARALLEL) -> nodes.Node:
+    """Lines 3 to 28: the tree of rules that may be those of single actions, under any root.
+
+    A memoryless Selector root, which the paper allows for, can be executed when actions take longer
+    than a tick: a Parallel fails as soon as one child fails.
+
+    Args:
+        rules: From `dt_to_rules_psa`, or from `dt_to_rules` where PSA nodes are offered as SAES.
+        root: Kind of the root node.
+    """
+    rules = tuple(rules)
+    inv_set = build_inv_set(rules)
+    factored = pullout_common(reduce_floats(logic_minimizer(rules)))
+    return with_root(root, [rule_tree(rule, inv_set) for rule in factored])
+
+
+def build_inv_set(rules: Iterable[Rule]) -> frozenset[Literal]:
+    """BUILD_INV_SET: literals to be shown as the inverse of another one."""
+    return inverses.build_inv_set(rule.dnf for rule in rules)
+
+
+def logic_minimizer(rules: Iterable[Rule]) -> tuple[Rule, ...]:
+    """LOGIC_MINIMIZER: the rules with espresso's DNFs."""
+    return tuple(Rule(one.actions, minimize.minimize(one.dnf), one.support) for one in rules)
+
+
+def reduce_floats(rules: Iterable[Rule]) -> tuple[Rule, ...]:
+    """FLOAT_REDUCTION: the rules without subsumed thresholds."""
+    return tuple(
+        Rule(one.actions, float_reduction.float_reduction(one.dnf), one.support) for one in rules
+    )
+
+
+def pullout_common(rules: Iterable[Rule]) -> tuple[FactoredRule, ...]:
+    """PULLOUT_COMMON: the rules with the literals that all their conjunctions share in front."""
+    return tuple(FactoredRule(one.actions, factoring.pull_out_common(one.dnf)) for one in rules)
 
 
 def rule_tree(rule: FactoredRule, inv_set: frozenset[Literal]) -> nodes.Node:

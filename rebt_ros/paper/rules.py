@@ -9,7 +9,6 @@ from rebt_ros.behavior_tree.nodes import Action
 from rebt_ros.decision_tree.tree import DecisionTree, Leaf
 from rebt_ros.logic.conditions import deciding
 from rebt_ros.logic.dnf import Conjunction, Dnf
-from rebt_ros.logic.factoring import Factored
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,14 +25,6 @@ class Rule:
     def labels(self) -> tuple[str, ...]:
         """Labels of the actions."""
         return tuple(action.label for action in self.actions)
-
-
-@dataclass(frozen=True, slots=True)
-class FactoredRule:
-    """A rule whose DNF has been factored."""
-
-    actions: tuple[Action, ...]
-    condition: Factored
 
 
 def dt_to_rules(tree: DecisionTree) -> tuple[Rule, ...]:

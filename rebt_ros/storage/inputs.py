@@ -68,6 +68,11 @@ class InputKind(Enum):
     BAG = "bag"
 
 
+def as_paths(inputs: Sequence[str | Path] | str | Path) -> tuple[Path, ...]:
+    """Inputs as people name them in Python: several, or the only one."""
+    return tuple(map(Path, [inputs] if isinstance(inputs, str | Path) else inputs))
+
+
 def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     """Reads demonstrations.
 

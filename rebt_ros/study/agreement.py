@@ -11,7 +11,6 @@ with all of them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,19 +20,13 @@ from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning import evaluation
-from rebt_ros.study.modes import Mode, main_tree
+from rebt_ros.study.mode import Mode
+from rebt_ros.study.mode_trees import main_tree
+from rebt_ros.study.results import Agreement
 from rebt_ros.study.settings import MAX_DEPTH
 
 #: Of more pruning levels, so many are tried, evenly spread.
 _MOST_LEVELS = 8
-
-
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """How often a tree did what was demonstrated."""
-
-    right: int
-    rows: int
 
 
 def held_out_agreements(table: DemonstrationTable) -> dict[Mode, Agreement]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rebt_ros.errors import InputError
-from rebt_ros.learning.pipeline import Progress
+from rebt_ros.learning.progress import Progress
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.study.configurations import (
     Lost,
@@ -20,6 +20,7 @@ from rebt_ros.study.figures import usable
 from rebt_ros.study.page import report_page
 from rebt_ros.study.report import Report, report_csv, report_json, report_of
 from rebt_ros.study.result_files import ResultFiles
+from rebt_ros.study.running import attempt
 from rebt_ros.study.settings import Settings
 from rebt_ros.study.workers import run_all
 
@@ -67,7 +68,7 @@ def run_experiment(
     finished = [result for result in kept.values() if result is not None]
     missing = [config for config in configs if kept[config.name] is None]
     failed: list[Lost] = list(lost)
-    for result in run_all(missing, settings, jobs, scheduler):
+    for result in run_all(missing, settings, attempt, jobs, scheduler):
         if isinstance(result, Lost):
             failed.append(result)
         else:

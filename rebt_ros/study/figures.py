@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from statistics import mean, median
 from typing import Literal
 
-from rebt_ros.study.modes import Mode
+from rebt_ros.study.mode import Mode
 from rebt_ros.study.reduction import Reductions
-from rebt_ros.study.results import ConfigurationResult, LevelSizes, SubtreeResult
-from rebt_ros.study.scores import Score
+from rebt_ros.study.results import ConfigurationResult, LevelSizes, Score, SubtreeResult
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,32 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.beyond_the_paper.routines.finding import FoundRoutine
-from rebt_ros.decision_tree.training import TrainedTree
-from rebt_ros.decision_tree.tree import DecisionTree
+from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
+from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.learning.choice import convert
-from rebt_ros.learning.options import DEFAULTS, LearnOptions
-from rebt_ros.learning.suggesting import accept, suggest
-from rebt_ros.learning.suggestions import ALL
-from rebt_ros.paper import re_bt_espresso
+from rebt_ros.learning.attaching import accept
+from rebt_ros.learning.options import ALL, DEFAULTS, LearnOptions
+from rebt_ros.learning.suggesting import suggest
 from rebt_ros.paper.lat_occurrences import Occurrences
-from rebt_ros.paper.rules import dt_to_rules_psa
+from rebt_ros.study.mode import Mode
 from rebt_ros.study.settings import MAX_DEPTH, MOST_SUGGESTIONS
-
-
-class Mode(Enum):
-    """A way from a decision tree to generated subtrees."""
-
-    BASELINE = "baseline"
-    """BT-Espresso."""
-    PAPER = "paper"
-    """RE:BT-Espresso as printed, all suggestions attached to the root."""
-    DEFAULT = "default"
-    """What is learned without options: at most twelve suggestions beside the main tree."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,31 +28,6 @@ class Offer:
     """The generated subtrees: those under the root, then the suggestions, best supported first."""
     suggestions: int
     """How many of them are suggestions."""
-
-
-def main_tree(mode: Mode, trained: TrainedTree) -> nodes.Node:
-    """The behavior tree of a decision tree, without suggestions."""
-    match mode:
-        case Mode.BASELINE:
-            return re_bt_espresso.bt_espresso(trained.tree)
-        case Mode.PAPER:
-            return convert(trained, LearnOptions.paper(), psa=True)
-        case Mode.DEFAULT:
-            # PSA nodes are suggested; in the main tree they are only where they raise agreement.
-            return convert(trained, DEFAULTS, psa=False)
-
-
-def plain_tree(mode: Mode, tree: DecisionTree, main: nodes.Node) -> nodes.Node:
-    """The main tree without any SAES, as its size is compared (paper, IV-B).
-
-    Args:
-        mode: Which way.
-        tree: The decision tree.
-        main: What `main_tree` made of it.
-    """
-    if mode is Mode.PAPER:
-        return re_bt_espresso.main_tree(dt_to_rules_psa(tree, 0.0))
-    return main
 
 
 def offer(

@@ -9,7 +9,7 @@ from html import escape
 
 from rebt_ros.study.bars import BarChart, bar_chart_svg, histogram
 from rebt_ros.study.figures import Difference, Loss, differences, reductions
-from rebt_ros.study.modes import Mode
+from rebt_ros.study.mode import Mode
 from rebt_ros.study.provenance import provenance
 from rebt_ros.study.report import Report, rows_of_table
 

@@ -20,7 +20,7 @@ from rebt_ros.study.figures import (
     measured,
     mode_figures,
 )
-from rebt_ros.study.modes import Mode
+from rebt_ros.study.mode import Mode
 from rebt_ros.study.provenance import provenance
 from rebt_ros.study.reduction import Reductions
 from rebt_ros.study.results import ConfigurationResult, SubtreeResult

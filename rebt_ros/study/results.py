@@ -8,10 +8,40 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from rebt_ros.errors import InputError
-from rebt_ros.study.agreement import Agreement
-from rebt_ros.study.modes import Mode
+from rebt_ros.study.mode import Mode
 from rebt_ros.study.reduction import Size, SizeComparison
-from rebt_ros.study.scores import Score
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What a mode reaches for one simulated subtree."""
+
+    minimum: float
+    """Least distance of all pruning levels."""
+    minimum_at_least: float
+    """No exact graph edit distance of all levels is below this."""
+    median: float
+    """Of the levels' scores."""
+    levels: int
+    exact_levels: int
+    """Levels whose score is known to be the exact graph edit distance."""
+    nodes: int
+    """Of the minimum-scoring subtree as it is compared, as the next two: of several the one with
+    the fewest nodes, and of these the first."""
+    repeaters: int
+    psa: int
+    level: int
+    """The pruning level that it comes from, 0 is not pruned."""
+    found: str
+    """The minimum-scoring subtree in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """How often a tree did what was demonstrated."""
+
+    right: int
+    rows: int
 
 
 @dataclass(frozen=True, slots=True)

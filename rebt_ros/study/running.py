@@ -8,20 +8,23 @@ from dataclasses import dataclass
 from random import Random
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.beyond_the_paper.routines.finding import FoundRoutine
+from rebt_ros.beyond_the_paper.routines.finding import find_routines
+from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
 from rebt_ros.decision_tree.encoding import Vocabulary
-from rebt_ros.decision_tree.training import TrainedTree, fit
+from rebt_ros.decision_tree.fitted import TrainedTree
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, RebtError
-from rebt_ros.learning.options import DEFAULTS
-from rebt_ros.learning.suggesting import occurrences_in, routines_of
+from rebt_ros.learning.suggesting import occurrences_in
 from rebt_ros.paper.lat_occurrences import Occurrences
 from rebt_ros.study.agreement import held_out_agreements
 from rebt_ros.study.configurations import Lost, digest
 from rebt_ros.study.edit_distance.labelled_tree import labelled
 from rebt_ros.study.edit_distance.networkx_measure import NetworkxMeasure
-from rebt_ros.study.modes import Mode, main_tree, offer, plain_tree
+from rebt_ros.study.mode import Mode
+from rebt_ros.study.mode_trees import main_tree, plain_tree
+from rebt_ros.study.modes import offer
 from rebt_ros.study.provenance import fingerprint
 from rebt_ros.study.reduction import Size, SizeComparison
 from rebt_ros.study.results import (
@@ -108,7 +111,7 @@ def _levels(table: DemonstrationTable) -> dict[Mode, list[_Level]]:
     if len(table.actions) < 2:
         return made
     fitted = fit(table, vocabulary=Vocabulary(History.LAST), max_depth=MAX_DEPTH)
-    routines = routines_of(table, DEFAULTS)
+    routines = find_routines(table)
     occurrences = occurrences_in(table)
     for ccp_alpha in fitted.path.alphas.tolist():
         trained = fitted.at(ccp_alpha)

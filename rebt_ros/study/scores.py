@@ -19,6 +19,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.study.edit_distance.bounds import Bounds, distance_bounds
 from rebt_ros.study.edit_distance.canonical import canonical
 from rebt_ros.study.edit_distance.labelled_tree import LabelledTree, labelled
+from rebt_ros.study.results import Score
 from rebt_ros.study.words import one_line
 
 
@@ -39,30 +40,6 @@ class ComparedTree:
     def psa(self) -> int:
         """Number of Parallel/Selector nodes."""
         return self.tree.labels.count(nodes.ParallelSelector.__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class Score:
-    """What a mode reaches for one simulated subtree."""
-
-    minimum: float
-    """Least distance of all pruning levels."""
-    minimum_at_least: float
-    """No exact graph edit distance of all levels is below this."""
-    median: float
-    """Of the levels' scores."""
-    levels: int
-    exact_levels: int
-    """Levels whose score is known to be the exact graph edit distance."""
-    nodes: int
-    """Of the minimum-scoring subtree as it is compared, as the next two: of several the one with
-    the fewest nodes, and of these the first."""
-    repeaters: int
-    psa: int
-    level: int
-    """The pruning level that it comes from, 0 is not pruned."""
-    found: str
-    """The minimum-scoring subtree in words."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import os
 import re
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
 
@@ -20,7 +20,6 @@ import joblib
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.study.configurations import Lost
 from rebt_ros.study.results import ConfigurationResult
-from rebt_ros.study.running import attempt
 from rebt_ros.study.settings import Settings
 from rebt_ros.study.simulator.configuration import ExperimentConfig
 
@@ -34,6 +33,10 @@ _WATCH_SECONDS = 0.5
 _IN_ORDER = joblib.__version__.startswith("1.3.")
 
 
+#: Runs a configuration, and says why where it cannot.
+Attempt = Callable[[ExperimentConfig, Settings], ConfigurationResult | Lost]
+
+
 class WorkerError(RebtError):
     """A worker, or the cluster, does not work."""
 
@@ -41,6 +44,7 @@ class WorkerError(RebtError):
 def run_all(
     configs: Sequence[ExperimentConfig],
     settings: Settings,
+    attempt: Attempt,
     jobs: int = -1,
     scheduler: str | None = None,
 ) -> Iterator[ConfigurationResult | Lost]:
@@ -49,6 +53,7 @@ def run_all(
     Args:
         configs: What to run.
         settings: How.
+        attempt: What runs each of them; known by its name to other processes.
         jobs: Processes; -1 for one per processor.  Not for a cluster, of which all workers work.
         scheduler: Address of a Dask scheduler; None for this machine.
 
@@ -66,7 +71,7 @@ def run_all(
     if not configs:
         return
     here = os.getpid() if scheduler is None else None
-    tasks = (joblib.delayed(_attempt)(config, settings, here) for config in configs)
+    tasks = (joblib.delayed(_attempt)(attempt, config, settings, here) for config in configs)
     with _cluster(scheduler) if scheduler is not None else contextlib.nullcontext():
         # One at a time, so that each is written as soon as it is finished.
         parallel = joblib.Parallel(
@@ -84,7 +89,7 @@ def run_all(
 
 
 def _attempt(
-    config: ExperimentConfig, settings: Settings, parent: int | None
+    attempt: Attempt, config: ExperimentConfig, settings: Settings, parent: int | None
 ) -> ConfigurationResult | Lost:
     """Runs a configuration, in the process `parent` or in one that is to end with it, if any."""
     if parent not in (None, os.getpid()):

@@ -28,7 +28,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, encode
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.learning.choice import convert
+from rebt_ros.learning.conversion import convert
 from rebt_ros.learning.options import DEFAULTS, LearnOptions
 from rebt_ros.learning.pipeline import learn_from
 

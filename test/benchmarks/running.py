@@ -15,10 +15,11 @@ from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, encode
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import History
-from rebt_ros.learning.choice import convert
+from rebt_ros.learning.conversion import convert
 from rebt_ros.learning.evaluation import actions_of
+from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.options import DEFAULTS, LearnOptions, Use
-from rebt_ros.learning.pipeline import Learning, learn_from
+from rebt_ros.learning.pipeline import learn_from
 from rebt_ros.logic.conditions import Interval, Threshold
 
 

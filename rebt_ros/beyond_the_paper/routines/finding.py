@@ -9,6 +9,7 @@ import numpy as np
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.beyond_the_paper.routines.corpus import LONGEST_WORD, corpus
+from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
 from rebt_ros.beyond_the_paper.routines.guards import Guard, guard, holds
 from rebt_ros.beyond_the_paper.routines.likelihood import Model
 from rebt_ros.beyond_the_paper.routines.moments import Moments, moments
@@ -35,17 +36,6 @@ _FEWEST_PASSED = 30
 #: How much rarer going on must be where a guard does not hold: within a stream, and at its
 #: beginning, which may also have been waited for while the state changed.
 _CONTRAST, _CONTRAST_AT_BEGINNING = 0.6, 0.72
-
-
-@dataclass(frozen=True, slots=True)
-class FoundRoutine:
-    """A Sequence or Repeater that the demonstrator seems to have followed."""
-
-    subtree: nodes.Sequence | nodes.Repeater
-    support: int
-    """How often it was gone through: as often as the rarest of its actions was done in it."""
-    rows: int
-    """How many rows it explains."""
 
 
 def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:

@@ -21,7 +21,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Figures
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.table import tabulate
-from rebt_ros.learning.pipeline import as_learned
+from rebt_ros.learning.levels import as_learned
 from rebt_ros.paper.re_bt_espresso import bt_espresso
 from rebt_ros.storage.inputs import load
 

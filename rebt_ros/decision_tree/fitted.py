@@ -1,0 +1,321 @@
+"""Decision trees after they were grown: pruned to any level, run over tables, carried as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.behavior_tree.nodes import Action
+from rebt_ros.decision_tree.encoding import (
+    Indicator,
+    Number,
+    Vocabulary,
+    columns,
+    difference_of,
+    encode,
+)
+from rebt_ros.decision_tree.grown import GrownTree
+from rebt_ros.decision_tree.pruning import PruningPath
+from rebt_ros.decision_tree.readable_thresholds import shared_thresholds
+from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import (
+    KNOWN,
+    Difference,
+    HasCategory,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    PreviousActionIs,
+    Threshold,
+)
+
+#: Rows that are predicted at a time.
+_ROWS_AT_A_TIME = 65_536
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TrainedTree:
+    """A decision tree as data, beside the grown tree that it must equal."""
+
+    tree: DecisionTree
+    vocabulary: Vocabulary
+    """What it may test beside the features."""
+    grown: GrownTree
+    """Not pruned."""
+    standing: IntArray
+    """The node that decides for each node as grown: itself, or what it is pruned to."""
+    thresholds: FloatArray | None = None
+    """What each node compares with in double precision, shape (nodes,); None where thresholds are
+    those of the grown tree, in single precision."""
+    notes: tuple[str, ...] = ()
+    """What a person should know about the rows that it was fitted to; no full stops."""
+
+    def predict(self, table: DemonstrationTable) -> IntArray:
+        """What it chooses, without going through `tree`: positions in ``table.actions``.
+
+        That is scikit-learn's own prediction, unless thresholds were moved.  Shape (rows,).
+        """
+        return np.asarray(self.grown.majority[self.leaves(table)])
+
+    def deciding(self, table: DemonstrationTable) -> tuple[tuple[Leaf, ...], IntArray]:
+        """The leaves that decide for the rows, and the position of each row's one among them."""
+        nodes, position = np.unique(self.leaves(table), return_inverse=True)
+        counts = self.grown.counts[nodes].tolist()
+        return tuple(Leaf(tuple(rows)) for rows in counts), position
+
+    def leaves(self, table: DemonstrationTable) -> IntArray:
+        """The node that decides for each row, shape (rows,)."""
+        if self.thresholds is None:
+            reached = _reached(self.grown, table, self.vocabulary)
+        else:
+            reached = _compared(self.grown, table, self.vocabulary, self.thresholds)
+        return np.asarray(self.standing[reached])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FittedTree:
+    """One fit with all its pruning levels."""
+
+    grown: GrownTree
+    path: PruningPath
+    actions: tuple[Action, ...]
+    asked: tuple[Number | Indicator, ...]
+    """What each column of the encoded table asks."""
+    vocabulary: Vocabulary
+    """What it may test beside the features."""
+    max_depth: int | None
+    random_state: int
+    notes: tuple[str, ...] = ()
+    """What a person should know about the rows that it was fitted to; no full stops."""
+
+    @property
+    def leaves(self) -> int:
+        """Leaves of the tree before it is pruned."""
+        return int(np.count_nonzero(self.grown.left < 0))
+
+    @property
+    def explanation(self) -> int:
+        """How much it takes to explain the rows that it was fitted to: leaves and exceptions.
+
+        Exceptions are the rows that a tree gets wrong.  Of all ways to prune this one it is the
+        least number, so that what demonstrators do by mistake counts as that.
+        """
+        grown = self.grown
+        sizes = (1 + grown.counts.sum(axis=1) - grown.counts.max(axis=1)).tolist()
+        left, other = grown.left.tolist(), grown.right.tolist()
+        # Children come after their parents.
+        for node in range(len(grown) - 1, -1, -1):
+            if left[node] >= 0:
+                sizes[node] = min(sizes[node], sizes[left[node]] + sizes[other[node]])
+        return int(sizes[0])
+
+    def right(self, table: DemonstrationTable) -> int:
+        """How many rows the tree predicts before it is pruned."""
+        return int(self.hits(table, np.zeros(1)).sum())
+
+    def path_lengths(self, table: DemonstrationTable) -> IntArray:
+        """Splits between the root and the leaf that each row reaches, shape (rows,)."""
+        depth = np.zeros(len(self.path.parents), dtype=np.int64)
+        # Parents come before their children.
+        for node in range(1, len(depth)):
+            depth[node] = depth[self.path.parents[node]] + 1
+        return np.asarray(depth[_reached(self.grown, table, self.vocabulary)])
+
+    def at(self, ccp_alpha: float) -> TrainedTree:
+        """The tree as pruned at `ccp_alpha`; equal to scikit-learn's own fit with it."""
+        is_leaf = self.path.leaves_at(ccp_alpha)
+        return self._trained(is_leaf, None)
+
+    def readable_at(self, ccp_alpha: float, table: DemonstrationTable) -> TrainedTree:
+        """The tree as pruned at `ccp_alpha`, with thresholds that are round and shared.
+
+        Each threshold lies in the gap between the rows of its node, so that no row of the table
+        reaches another leaf.
+
+        Args:
+            ccp_alpha: The pruning level.
+            table: What the tree was fitted to, without made-up rows.
+        """
+        is_leaf = self.path.leaves_at(ccp_alpha)
+        exact = self._exact_thresholds()
+        low, high = _gaps(self.grown, table, self.vocabulary, exact)
+        of_quantity: dict[int, list[int]] = {}
+        for node in np.flatnonzero(~is_leaf & np.isfinite(low) & (exact != KNOWN)).tolist():
+            column = int(self.grown.column[node])
+            if isinstance(self.asked[column], Number):
+                of_quantity.setdefault(column, []).append(node)
+        for split in of_quantity.values():
+            gaps = [(float(low[node]), float(high[node])) for node in split]
+            exact[split] = shared_thresholds(gaps)
+        return self._trained(is_leaf, exact)
+
+    def _trained(self, is_leaf: BoolArray, thresholds: FloatArray | None) -> TrainedTree:
+        root = _as_data(self.grown, self.asked, is_leaf, thresholds)
+        return TrainedTree(
+            DecisionTree(self.actions, root),
+            self.vocabulary,
+            self.grown,
+            self.path.standing(is_leaf),
+            thresholds,
+            self.notes,
+        )
+
+    def _exact_thresholds(self) -> FloatArray:
+        """What the nodes compare with in double precision, deciding as scikit-learn does."""
+        grown = self.grown
+        thresholds = grown.threshold.copy()
+        for node in np.flatnonzero(grown.left >= 0).tolist():
+            match self.asked[grown.column[node]].at_most(float(thresholds[node])).condition:
+                case Threshold(value=value):
+                    thresholds[node] = value
+        return thresholds
+
+    def hits(self, table: DemonstrationTable, ccp_alphas: FloatArray) -> IntArray:
+        """How many of a table's rows of each action each pruning level predicts.
+
+        A node decides at the levels from its own ``collapse`` up to its parent's.  So the rows that
+        a level predicts are those that reach its deciding nodes with their majority action, and
+        one pass over the nodes counts them for all levels.
+
+        Args:
+            table: At least one row, with the actions that the tree was fitted to.
+            ccp_alphas: The levels, ascending, shape (levels,).
+
+        Returns:
+            Shape (levels, actions), in the order of the table's actions.
+        """
+        count = len(self.grown)
+        reached = _reached(self.grown, table, self.vocabulary)
+        actions = len(table.actions)
+        counts = np.bincount(reached * actions + table.chosen, minlength=count * actions)
+        counts = counts.reshape(count, actions)
+        # Rows that reach a node reach its parent; parents come before their children.
+        for node in range(count - 1, 0, -1):
+            counts[self.path.parents[node]] += counts[node]
+        majority = self.grown.majority
+        predicted = counts[np.arange(count), majority]
+        first, end = self.path.levels_decided(ccp_alphas)
+        change = np.zeros((len(ccp_alphas) + 1, actions), dtype=np.int64)
+        np.add.at(change, (first, majority), predicted)
+        np.add.at(change, (end, majority), -predicted)
+        return np.asarray(np.cumsum(change, axis=0)[:-1])
+
+
+def _reached(grown: GrownTree, table: DemonstrationTable, vocabulary: Vocabulary) -> IntArray:
+    """The leaf as grown that each row reaches, shape (rows,)."""
+    reached = np.empty(len(table), dtype=np.int64)
+    # In parts, so that a large table is not held a second time.
+    for start in range(0, len(table), _ROWS_AT_A_TIME):
+        rows = slice(start, start + _ROWS_AT_A_TIME)
+        reached[rows] = grown.apply(encode(table, vocabulary, rows))
+    return reached
+
+
+def _compared(
+    grown: GrownTree,
+    table: DemonstrationTable,
+    vocabulary: Vocabulary,
+    thresholds: FloatArray,
+) -> IntArray:
+    """The leaf that each row reaches with thresholds in double precision, shape (rows,)."""
+    values = _Values(grown, table, vocabulary)
+    node = np.zeros(len(table), dtype=np.int64)
+    under_way = np.arange(len(table))
+    while (under_way := under_way[grown.left[node[under_way]] >= 0]).size:
+        at = node[under_way]
+        left = values.of(under_way, grown.column[at]) <= thresholds[at]
+        node[under_way] = np.where(left, grown.left[at], grown.right[at])
+    return node
+
+
+def _gaps(
+    grown: GrownTree,
+    table: DemonstrationTable,
+    vocabulary: Vocabulary,
+    thresholds: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """The largest known value that goes left at each split, and the smallest that goes right.
+
+    Returns:
+        Two of shape (nodes,): -inf and inf where there is none.
+    """
+    values = _Values(grown, table, vocabulary)
+    low, high = np.full(len(grown), -np.inf), np.full(len(grown), np.inf)
+    node = np.zeros(len(table), dtype=np.int64)
+    under_way = np.arange(len(table))
+    while (under_way := under_way[grown.left[node[under_way]] >= 0]).size:
+        at = node[under_way]
+        value = values.of(under_way, grown.column[at])
+        left = value <= thresholds[at]
+        np.maximum.at(low, at[left], value[left])
+        np.minimum.at(high, at[~left], value[~left])
+        node[under_way] = np.where(left, grown.left[at], grown.right[at])
+    return low, high
+
+
+class _Values:
+    """What a tree's columns hold in double precision; infinite where it is missing."""
+
+    def __init__(self, grown: GrownTree, table: DemonstrationTable, vocabulary: Vocabulary) -> None:
+        self._columns = {}
+        for place, asked in enumerate(columns(table, vocabulary)):
+            if place in grown.column:
+                values = _asked(asked, table, vocabulary)
+                self._columns[place] = np.where(np.isnan(values), np.inf, values)
+
+    def of(self, rows: IntArray, column: IntArray) -> FloatArray:
+        """The value of one column in each of the rows, shape (rows,)."""
+        values = np.empty(len(rows))
+        for place, its in self._columns.items():
+            here = column == place
+            values[here] = its[rows[here]]
+        return values
+
+
+def _asked(
+    asked: Number | Indicator, table: DemonstrationTable, vocabulary: Vocabulary
+) -> FloatArray:
+    place = {feature.name: index for index, feature in enumerate(table.features)}
+    match asked:
+        case Number(quantity=Difference() as difference):
+            return difference_of(table, difference, table.states)
+        case Number(quantity=str(name)):
+            return table.states[:, place[name]]
+        case Indicator(condition=IsTrue(feature=name)):
+            holds = table.states[:, place[name]] == 1
+        case Indicator(condition=HasCategory(feature=name, category=category)):
+            code = table.features[place[name]].categories.index(category)
+            holds = table.states[:, place[name]] == code
+        case Indicator(condition=PreviousActionIs(action=action)):
+            holds = table.previous == table.actions.index(action)
+        case Indicator(condition=LastActionIs(action=action)):
+            holds = table.last == table.actions.index(action)
+        case _:
+            raise AssertionError(asked)
+    return np.asarray(holds, dtype=np.float64)
+
+
+def _as_data(
+    grown: GrownTree,
+    asked: tuple[Number | Indicator, ...],
+    is_leaf: BoolArray,
+    thresholds: FloatArray | None,
+) -> DecisionNode:
+    data: dict[int, DecisionNode] = {}
+    # Children come after their parents.
+    for node in range(len(grown) - 1, -1, -1):
+        if is_leaf[node]:
+            data[node] = Leaf(tuple(grown.counts[node].tolist()))
+            continue
+        left, right = int(grown.left[node]), int(grown.right[node])
+        column = asked[grown.column[node]]
+        if isinstance(column, Number) and thresholds is not None:
+            literal = Literal(Threshold(column.quantity, float(thresholds[node])))
+        else:
+            literal = column.at_most(float(grown.threshold[node]))
+        holds, fails = (left, right) if literal.positive else (right, left)
+        data[node] = Split(literal.condition, data[holds], data[fails])
+    return data[0]

@@ -1,0 +1,55 @@
+"""Decision trees as they were grown: arrays over their nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rebt_ros.arrays import Float32Array, FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GrownTree:
+    """The nodes of a binary tree, each before its children; the root comes first."""
+
+    left: IntArray
+    """Where a row goes whose value is at most the threshold, shape (nodes,); -1 at leaves."""
+    right: IntArray
+    """Where it goes otherwise, shape (nodes,); -1 at leaves."""
+    column: IntArray
+    """What is compared, shape (nodes,); of no meaning at leaves."""
+    threshold: FloatArray
+    """With what, shape (nodes,); of no meaning at leaves."""
+    counts: IntArray
+    """Rows of each action that it was grown from, shape (nodes, actions)."""
+    risk: FloatArray
+    """Impurity times the share of the rows, shape (nodes,)."""
+    engine: Callable[[Float32Array], IntArray] | None = None
+    """What does the same as `apply`, but faster; None where there is nothing."""
+
+    def __len__(self) -> int:
+        return len(self.left)
+
+    @property
+    def majority(self) -> IntArray:
+        """The most frequent action of each node, of equals the first, shape (nodes,)."""
+        return np.asarray(np.argmax(self.counts, axis=1))
+
+    def apply(self, matrix: Float32Array) -> IntArray:
+        """The leaf that each row of a matrix reaches, shape (rows,).
+
+        Args:
+            matrix: Shape (rows, columns).
+        """
+        if self.engine is not None:
+            return self.engine(matrix)
+        node = np.zeros(len(matrix), dtype=np.int64)
+        under_way = np.arange(len(matrix)) if self.left[0] >= 0 else np.empty(0, dtype=np.int64)
+        while len(under_way):
+            at = node[under_way]
+            left = matrix[under_way, self.column[at]] <= self.threshold[at]
+            node[under_way] = np.where(left, self.left[at], self.right[at])
+            under_way = under_way[self.left[node[under_way]] >= 0]
+        return node

@@ -1,0 +1,101 @@
+"""How well pruning levels do in cross-validation, and which of them is chosen: pruning has to pay.
+
+The largest tree is chosen that is not clearly worse than the best one: by more than three quarters
+of a standard error of their difference, fold by fold.  Where demonstrators err, large trees are
+clearly worse, and pruned.  Elsewhere the few rows that decide a task stay.
+
+The usual rule of one standard error (Breiman et al., 1984) is another one: it takes the smallest
+tree, and an error that measures how much demonstrations differ instead of how much trees do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+
+#: Standard errors of a difference from which on it is clear.  A difference that a single fold makes
+#: is one standard error large, and clear; one on which folds disagree is not.
+_CLEAR = 0.75
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class JudgedLevels:
+    """Pruning levels with how well the folds' trees do on the rows they were not learned from."""
+
+    ccp_alphas: FloatArray
+    """Ascending, shape (levels,): larger means a smaller tree."""
+    hits: IntArray
+    """Rows of each action on which a level takes it, shape (folds, levels, actions)."""
+    shown: IntArray
+    """Rows of each action, shape (folds, actions)."""
+
+    @property
+    def scores(self) -> FloatArray:
+        """Agreement with the rows of each fold, shape (folds, levels)."""
+        return np.asarray(self.hits.sum(axis=2) / self.shown.sum(axis=1)[:, np.newaxis])
+
+    @property
+    def means(self) -> FloatArray:
+        """Mean agreement of each level, shape (levels,)."""
+        return np.asarray(np.mean(self.scores, axis=0))
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard error of each mean agreement, shape (levels,)."""
+        return _standard_error(self.scores)
+
+    @property
+    def recalls(self) -> FloatArray:
+        """Recall of each action over all folds, NaN where it was not shown: (levels, actions)."""
+        shown = self.shown.sum(axis=0)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.hits.sum(axis=0) / shown)
+
+    @property
+    def mean_recalls(self) -> FloatArray:
+        """Mean recall of the actions at each level, shape (levels,)."""
+        return np.asarray(self.contributions.sum(axis=0))
+
+    @property
+    def best(self) -> int:
+        """The level with the highest mean recall; of equals, the one with the largest tree."""
+        # Sums of the same shares in another order may differ in the last bits.
+        return int(np.argmax(np.round(self.mean_recalls, 12)))
+
+    @property
+    def chosen(self) -> int:
+        """The largest tree that is not clearly worse than the best."""
+        contributions, best = self.contributions, self.best
+        return int(np.argmax(~_clearly_above_zero(contributions[:, [best]] - contributions)))
+
+    def at(self, ccp_alpha: float) -> int:
+        """The level that a ``ccp_alpha`` comes to."""
+        return max(int(np.searchsorted(self.ccp_alphas, ccp_alpha, side="right")) - 1, 0)
+
+    @property
+    def contributions(self) -> FloatArray:
+        """What each fold adds to the mean recall, shape (folds, levels)."""
+        shown = self.shown.sum(axis=0)
+        return np.asarray(np.mean(self.hits[..., shown > 0] / shown[shown > 0], axis=2))
+
+
+def clearly_raised(before: JudgedLevels, after: JudgedLevels) -> bool:
+    """Whether the first level's mean recall is clearly higher in `after`, which has equal folds."""
+    gains = after.contributions[:, :1] - before.contributions[:, :1]
+    return bool(_clearly_above_zero(gains)[0])
+
+
+def _clearly_above_zero(gains: FloatArray) -> BoolArray:
+    """Of sums over folds, shape (levels,), where there are so many gains as folds and levels."""
+    clearly = _CLEAR * len(gains) * _standard_error(gains)
+    return np.asarray(np.round(gains.sum(axis=0) - clearly, 12) > 0)
+
+
+def _standard_error(values: FloatArray) -> FloatArray:
+    """Of the mean over the first axis; 0 where there is one value only."""
+    if len(values) < 2:
+        return np.zeros(values.shape[1:])
+    return np.asarray(np.std(values, axis=0, ddof=1) / np.sqrt(len(values)))

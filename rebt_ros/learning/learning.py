@@ -1,0 +1,190 @@
+"""A learned policy that can be looked into and changed without learning again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.decision_tree.fitted import TrainedTree
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import OptionError
+from rebt_ros.learning.attaching import accept
+from rebt_ros.learning.chosen_policy import ChosenPolicy
+from rebt_ros.learning.levels import Evidence, Levels
+from rebt_ros.learning.options import ALL, LearnOptions, PsaChoice
+from rebt_ros.learning.report import LearningReport, report_on
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Learning:
+    """The policy of one channel beside what it was made from.
+
+    Each verb gives another `Learning` and leaves this one as it is.
+    """
+
+    learned: LearnedTree
+    """What is published."""
+    plain: LearnedTree
+    """The same before anything was attached or resolved, with all suggestions."""
+    decision_tree: TrainedTree
+    policy: ChosenPolicy
+    """What was chosen to learn, and why."""
+    evidence: Evidence
+    """What it was learned from."""
+    report: LearningReport
+    """What a person must know about it."""
+    late: tuple[str, ...] = ()
+    """A sentence if actions were late; no full stop."""
+    further: tuple[str, ...] = ()
+    """Notes beside those of the report; no full stops."""
+    attached: tuple[str, ...] = ()
+    """Ids of the suggestions that are attached, or `ALL`."""
+    psa_choice: PsaChoice | None = None
+    """What all PSA nodes were turned into; None where they were left."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know about it; no full stops."""
+        return (*self.late, *self.report.notes(), *self.further)
+
+    @property
+    def table(self) -> DemonstrationTable:
+        """All rows."""
+        return self.evidence.table
+
+    @property
+    def options(self) -> LearnOptions:
+        """How it was learned, with what is attached by now."""
+        return replace(self.evidence.options, attach=self.attached, psa_choice=self.psa_choice)
+
+    @property
+    def levels(self) -> Levels:
+        """All pruning levels."""
+        return Levels(self.evidence, self.policy)
+
+    def level(self, number: int) -> Learning:
+        """The policy at another pruning level, without suggestions, which belong to a tree.
+
+        Args:
+            number: The level; 0 is not pruned.
+
+        Raises:
+            OptionError: There is no such level.
+        """
+        last = len(self.levels.ccp_alphas) - 1
+        if not 0 <= number <= last:
+            raise OptionError(f"there is no pruning level {number}: choose one of 0 to {last}.")
+        ccp_alpha = float(self.levels.ccp_alphas[number])
+        tree = self.evidence.tree_at(ccp_alpha)
+        before = self.learned.provenance
+        provenance = replace(
+            tree.learned.provenance, late_rows=before.late_rows, late_seconds=before.late_seconds
+        )
+        return replace(
+            self,
+            plain=replace(tree.learned, provenance=provenance),
+            decision_tree=tree.decision_tree,
+            policy=replace(self.policy, ccp_alpha=ccp_alpha),
+        )._accepting((), self.psa_choice)
+
+    def with_attached(self, *ids: str) -> Learning:
+        """The policy with further suggestions attached.
+
+        Args:
+            ids: Of the suggestions; `ALL` for all.
+
+        Raises:
+            OptionError: There is no suggestion with such an id.
+        """
+        return self._accepting(tuple(dict.fromkeys((*self.attached, *ids))), self.psa_choice)
+
+    def without(self, *ids: str) -> Learning:
+        """The policy with suggestions taken off again.
+
+        Args:
+            ids: Of suggestions that are attached; `ALL` for all.
+
+        Raises:
+            OptionError: One of them is not attached.
+        """
+        attached = [one.id for one in self.learned.suggestions if one.attached]
+        gone = attached if ALL in ids else ids
+        for name in gone:
+            if name not in attached:
+                known = f"attached are {', '.join(attached)}" if attached else "none is"
+                raise OptionError(f"suggestion {name!r} is not attached: {known}.")
+        kept = tuple(name for name in attached if name not in gone)
+        return self._accepting(kept, self.psa_choice)
+
+    def resolved(self, choice: PsaChoice | None) -> Learning:
+        """The policy with all PSA nodes turned into what is chosen; None leaves them."""
+        return self._accepting(self.attached, choice)
+
+    def edited(self, edit: Callable[[nodes.Node], nodes.Node]) -> Learning:
+        """The policy with a tree that a person changed (see `behavior_tree.paths`).
+
+        What is attached or resolved afterwards is based on the changed tree.
+
+        Args:
+            edit: From the tree to the changed one.
+
+        Raises:
+            ValueError: The changed tree tests or takes what is not declared.
+        """
+        learned = replace(self.learned, tree=edit(self.learned.tree))
+        offered = tuple(one for one in learned.suggestions if not one.attached)
+        plain = replace(learned, suggestions=offered)
+        return replace(self, plain=plain)._accepting((), None)
+
+    def _accepting(self, attached: tuple[str, ...], choice: PsaChoice | None) -> Learning:
+        options = replace(self.evidence.options, attach=attached, psa_choice=choice)
+        return replace(
+            learned_as_asked(
+                self.plain,
+                self.decision_tree,
+                self.policy,
+                replace(self.evidence, options=options),
+                late=self.late,
+                further=self.further,
+            ),
+            evidence=self.evidence,
+        )
+
+
+def learned_as_asked(
+    plain: LearnedTree,
+    decision_tree: TrainedTree,
+    policy: ChosenPolicy,
+    evidence: Evidence,
+    *,
+    late: tuple[str, ...] = (),
+    further: tuple[str, ...] = (),
+) -> Learning:
+    """A policy with the suggestions attached that its options name, and PSA nodes as they say.
+
+    Raises:
+        OptionError: There is no suggestion with such an id.
+    """
+    options = evidence.options
+    tree, suggestions = accept(plain.tree, plain.suggestions, options)
+    report = report_on(
+        evidence.learned_from,
+        tree,
+        decision_tree.vocabulary.history,
+        policy.levels,
+        policy.ccp_alpha,
+    )
+    return Learning(
+        replace(plain, tree=tree, suggestions=suggestions),
+        plain,
+        decision_tree,
+        policy,
+        evidence,
+        report,
+        late,
+        further,
+        options.attach,
+        options.psa_choice,
+    )

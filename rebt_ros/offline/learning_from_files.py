@@ -1,0 +1,146 @@
+"""Learning from files: the Python side of the command `learn`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, unmeasurable
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.drawing.text import render_text
+from rebt_ros.errors import InputError
+from rebt_ros.learning import pipeline
+from rebt_ros.learning.levels import check_most_levels
+from rebt_ros.learning.options import LearnOptions
+from rebt_ros.learning.progress import Progress
+from rebt_ros.offline.learning_file import write_learning
+from rebt_ros.offline.level_files import (
+    channel_directories,
+    clear_levels,
+    write_behavior_tree,
+    write_decision_tree,
+    write_levels,
+)
+from rebt_ros.offline.result import OfflineLearning, write_summary
+from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.inputs import InputOptions, as_paths, load
+
+#: Names that ROS 2 has for topics.
+_TOPIC = re.compile(r"/?(?:[A-Za-z_]\w*/)*[A-Za-z_]\w*", re.ASCII)
+
+#: So many different ones can be actions even where each was shown once or twice.
+_FEW_ACTIONS = 20
+
+#: Of all the work, where pruning levels are written.
+_LEARNING_SHARE = 0.3
+
+
+def learn(
+    inputs: Sequence[str | Path] | str | Path,
+    *,
+    out: str | Path | None = None,
+    options: LearnOptions | None = None,
+    reading: InputOptions | None = None,
+    declared: Mapping[str, FeatureKind] | None = None,
+    levels: bool = False,
+    most_levels: int = 100,
+    progress: Progress = lambda stage, share: None,
+) -> OfflineLearning:
+    """Learns a behavior tree from bags, recordings and CSV tables.
+
+    Args:
+        inputs: Each one or more demonstrations, oldest first; or the only one.
+        out: Directory to write to: tree.json, summary.json, tree.txt, learning.npz (see
+            `load_learning`), pictures of the behavior tree and of its decision tree.  With several
+            channels the decision trees and learning.npz are in channels/NAME/.
+        options: How to learn.
+        reading: How to read the inputs, such as which column of a CSV table is the action.
+        declared: Kinds of features by name, where they should not be detected.
+        levels: Whether all pruning levels are written as well, to levels/ beside each decision
+            tree.
+        most_levels: If so, this many at most.
+        progress: Told what is being done and which share of the work is behind.
+
+    Raises:
+        RebtError: An input cannot be used or an option makes no sense; nothing was written.
+    """
+    options = options or LearnOptions()
+    if levels:
+        check_most_levels(most_levels)
+    progress("reading", 0.0)
+    paths = as_paths(inputs)
+    reading = reading or InputOptions()
+    loaded = load(paths, replace(reading, features=reading.features | frozenset(declared or ())))
+    tables = tabulate(loaded.demonstrations, declared)
+    learning = _part(progress, 0.0, _LEARNING_SHARE) if levels else progress
+    for table in tables:
+        _refuse_what_are_no_actions(table)
+    learnings = pipeline.learn_channels(tables, options, learning)
+    further = (note for learning in learnings for note in learning.notes)
+    learned = pipeline.side_by_side(learnings)
+    notes = (*loaded.notes, *further, *_not_on_a_robot(learned))
+    result = OfflineLearning(learned, learnings, notes, loaded.accounts)
+    if out is not None:
+        writing = _part(progress, _LEARNING_SHARE, 1.0)
+        missing = _write_trees(Path(out), result, options, most_levels if levels else 0, writing)
+        result = replace(result, notes=(*notes, *missing))
+        write_summary(Path(out), result, [str(one) for one in paths], options)
+    progress("done", 1.0)
+    return result
+
+
+def _not_on_a_robot(learned: LearnedTree) -> Iterator[str]:
+    """What keeps the executor from running the tree."""
+    for feature in unmeasurable(learned):
+        yield (
+            f"the tree tests {feature.name!r}, which holds texts ({feature.examples}): "
+            "topics carry numbers, so that the executor refuses this tree; replay and "
+            "rebt_ros.Policy run it"
+        )
+    for channel in nodes.policies(learned.tree):
+        if not _TOPIC.fullmatch(channel):
+            yield (
+                f"{channel!r} is no name of a topic, so that the executor refuses this tree: "
+                "rename the label column, with letters, digits and underscores"
+            )
+
+
+def _refuse_what_are_no_actions(table: DemonstrationTable) -> None:
+    if len(table.actions) > _FEW_ACTIONS and len(table.actions) * 2 > len(table):
+        raise InputError(
+            f"{len(table.actions)} different actions in {len(table)} rows do not look like actions "
+            f"({', '.join(table.actions[:3])}, …): name the column with --label, or the topic with "
+            "--action-topic."
+        )
+
+
+def _part(progress: Progress, start: float, end: float) -> Progress:
+    """Progress of a part of the work."""
+    return lambda stage, share: progress(stage, start + share * (end - start))
+
+
+def _write_trees(
+    directory: Path,
+    result: OfflineLearning,
+    options: LearnOptions,
+    most_levels: int,
+    progress: Progress,
+) -> tuple[str, ...]:
+    """Writes all but the summary; returns notes, each once."""
+    notes = write_behavior_tree(directory, result.learned)
+    write_text_atomically(directory / "tree.txt", render_text(result.learned))
+    for place, (name, learning) in enumerate(channel_directories(result.learnings)):
+        beside = directory / name
+        notes += write_decision_tree(beside, learning.decision_tree.tree)
+        notes += write_learning(beside, learning)
+        if most_levels:
+            count = len(result.learnings)
+            of_channel = _part(progress, place / count, (place + 1) / count)
+            notes += write_levels(beside, learning.levels, most_levels, of_channel)
+        else:
+            clear_levels(beside)
+    return tuple(dict.fromkeys(notes))

@@ -1,0 +1,143 @@
+"""What learning from files gives, and its figures for scripts: summary.json."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.learning.judged_levels import JudgedLevels
+from rebt_ros.learning.learning import Learning
+from rebt_ros.learning.options import LearnOptions
+from rebt_ros.logic.conditions import Interval
+from rebt_ros.storage.account import Account
+from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.versions import versions
+
+#: Packages whose versions can change a result.
+_DECIDING_PACKAGES = ("numpy", "scikit-learn", "pyeda", "py_trees")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class OfflineLearning:
+    """A tree learned from files."""
+
+    learned: LearnedTree
+    """The value of the behavior tree document."""
+    learnings: tuple[Learning, ...]
+    """What it was made from, for each channel."""
+    notes: tuple[str, ...]
+    """What a person should know about the inputs; no full stops."""
+    accounts: Mapping[str, Account] = field(default_factory=dict)
+    """Where what each demonstration's file holds went."""
+
+
+def write_summary(
+    directory: Path, result: OfflineLearning, inputs: Sequence[str], options: LearnOptions
+) -> None:
+    """Writes summary.json."""
+    summary = summarize(result) | {
+        "inputs": list(inputs),
+        "accounts": {name: account.as_json() for name, account in result.accounts.items()},
+        "notes": list(result.notes),
+        "random_state": options.random_state,
+        "upsample": options.upsample.value,
+        "test_fraction": options.test_fraction,
+        "refit": options.refit,
+        "lags": options.lags,
+        "versions": _versions(options),
+    }
+    text = json.dumps(summary, indent=2, ensure_ascii=False)
+    write_text_atomically(directory / "summary.json", text + "\n")
+
+
+def summarize(result: OfflineLearning) -> dict[str, Any]:
+    """The figures of a learned tree, as written to summary.json."""
+    learned, provenance = result.learned, result.learned.provenance
+    figures = provenance.figures
+    summary = {
+        "rows": provenance.rows,
+        "demonstrations": provenance.demonstrations,
+        "features": [feature.name for feature in learned.features],
+        "actions": [action.label for action in learned.actions],
+        "nodes": nodes.size(learned.tree),
+        "intervals": _intervals(learned.tree),
+        "depth": nodes.depth(learned.tree),
+        "fidelity_mismatches": figures.fidelity_mismatches,
+        "held_out_rows": figures.held_out_rows,
+        "teacher_forced_agreement": figures.teacher_forced_agreement,
+        "own_history_agreement": figures.own_history_agreement,
+        "mean_recall": figures.mean_recall,
+        "history": provenance.history.value,
+        "row_kind": learned.row_kind.value,
+        "root": provenance.root.value,
+        "delta": provenance.delta,
+        "max_depth": provenance.max_depth,
+        "ccp_alpha": provenance.ccp_alpha,
+        "suggestions": [
+            {
+                "id": one.id,
+                "kind": one.kind.value,
+                "support": one.support,
+                "nodes": nodes.size(one.subtree),
+                "attached": one.attached,
+            }
+            for one in learned.suggestions
+        ],
+    }
+    if len(result.learnings) == 1:
+        return summary | _choices(result.learnings[0])
+    return summary | {"channels": {one.table.channel: _of_channel(one) for one in result.learnings}}
+
+
+def _of_channel(learning: Learning) -> dict[str, Any]:
+    figures = learning.learned.provenance.figures
+    return {
+        "rows": learning.learned.provenance.rows,
+        "nodes": nodes.size(learning.learned.tree),
+        "intervals": _intervals(learning.learned.tree),
+        "ccp_alpha": learning.policy.ccp_alpha,
+        "fidelity_mismatches": figures.fidelity_mismatches,
+        "teacher_forced_agreement": figures.teacher_forced_agreement,
+        "own_history_agreement": figures.own_history_agreement,
+        **_choices(learning),
+    }
+
+
+def _intervals(tree: nodes.Node) -> int:
+    """Nodes that stand for two thresholds each."""
+    conditions = (node for node in nodes.walk(tree) if isinstance(node, nodes.Condition))
+    return sum(isinstance(one.literal.condition, Interval) for one in conditions)
+
+
+def _choices(learning: Learning) -> dict[str, Any]:
+    return {
+        "decision_tree_leaves": learning.decision_tree.tree.leaves,
+        "psa": learning.policy.psa,
+        "report": learning.report.as_json(),
+        "reasons": list(learning.policy.reasons),
+        "levels": list(_levels(learning.policy.levels)),
+    }
+
+
+def _levels(levels: JudgedLevels | None) -> Iterator[dict[str, float]]:
+    """The pruning levels that were chosen from, with their agreement in cross-validation."""
+    if levels is not None:
+        columns = (levels.ccp_alphas, levels.mean_recalls, levels.means, levels.standard_errors)
+        for alpha, recall, mean, error in zip(*(one.tolist() for one in columns), strict=True):
+            yield {
+                "ccp_alpha": alpha,
+                "mean_recall": recall,
+                "agreement": mean,
+                "standard_error": error,
+            }
+
+
+def _versions(options: LearnOptions) -> dict[str, str]:
+    further = () if options.upsample is Upsampling.NONE else ("imbalanced-learn",)
+    return versions((*_DECIDING_PACKAGES, *further))

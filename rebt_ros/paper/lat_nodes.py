@@ -1,0 +1,70 @@
+"""Nodes and edges of the LAT graph.
+
+An action of a rule, or its PSA group, is an `ActionNode`; once cycles are removed, a cycle of such
+nodes is a `CycleNode`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rebt_ros.behavior_tree.nodes import Action
+
+
+@dataclass(frozen=True, slots=True)
+class ActionNode:
+    """The action of a rule, or its PSA group."""
+
+    actions: tuple[Action, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the actions that it takes."""
+        return tuple(action.label for action in self.actions)
+
+    @property
+    def nesting(self) -> int:
+        """How many cycles lie within each other here: none."""
+        return 0
+
+
+@dataclass(frozen=True, slots=True)
+class CycleNode:
+    """A cycle that was replaced by one node; it is its own entry of the paper's lookup table."""
+
+    path: tuple[GraphNode, ...]
+    """Its nodes from the start node on, the last of which leads back to the first."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the actions that it takes, each once."""
+        return tuple(dict.fromkeys(label for node in self.path for label in node.labels))
+
+    @property
+    def nesting(self) -> int:
+        """How many cycles lie within each other here, itself included."""
+        return 1 + max(node.nesting for node in self.path)
+
+
+GraphNode: TypeAlias = ActionNode | CycleNode
+
+
+@dataclass(frozen=True, slots=True)
+class LatGraph:
+    """A directed graph; nodes and edges are ordered, so that all that follows is too."""
+
+    nodes: tuple[GraphNode, ...]
+    edges: tuple[tuple[int, int], ...]
+    """Positions in `nodes`, each pair once, ascending."""
+
+    def __post_init__(self) -> None:
+        if sorted(set(self.edges)) != list(self.edges):
+            raise ValueError("the edges must be ascending, each pair once")
+        if not all(0 <= place < len(self.nodes) for edge in self.edges for place in edge):
+            raise ValueError("an edge names a node that does not exist")
+
+    def pairs(self) -> Iterator[tuple[GraphNode, GraphNode]]:
+        """The edges as pairs of nodes."""
+        return ((self.nodes[before], self.nodes[after]) for before, after in self.edges)
