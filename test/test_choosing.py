@@ -23,7 +23,7 @@ from rebt_ros.learning import evaluation
 from rebt_ros.learning.choice import choose
 from rebt_ros.learning.conversion import convert, own_history_choices
 from rebt_ros.learning.cross_validation import CrossValidation, folds
-from rebt_ros.learning.judged_levels import JudgedLevels
+from rebt_ros.learning.judged_levels import JudgedLevels, clearly_raised
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.logic.conditions import Difference
 
@@ -127,6 +127,19 @@ def test_no_tree_smaller_than_the_best_is_chosen_and_none_that_every_fold_speaks
     sums = hits.sum(axis=2)
     apart = sums[:, result.best] - sums[:, result.chosen]
     assert result.chosen == result.best or apart.min() < apart.max()
+
+
+@given(st.integers(1, 5), st.data())
+def test_a_recall_is_clearly_raised_where_the_better_level_would_be_chosen(
+    folds: int, data: st.DataObject
+) -> None:
+    drawn = data.draw(st.lists(counts, min_size=folds * 4, max_size=folds * 4), label="hits")
+    hits, shown = np.array(drawn).reshape(folds, 2, 2), np.full((folds, 2), 20)
+    both = JudgedLevels(np.arange(2.0), hits, shown)
+    before, after = (JudgedLevels(np.zeros(1), hits[:, [place]], shown) for place in range(2))
+    assert clearly_raised(before, after) is (both.chosen == 1)
+    assert not (clearly_raised(before, after) and clearly_raised(after, before))
+    assert not clearly_raised(before, before)
 
 
 def test_folds_are_whole_demonstrations_or_stretches_of_the_only_one() -> None:

@@ -222,7 +222,7 @@ def test_the_text_shows_the_suggestions_that_are_not_attached() -> None:
     text = render_text(learned(EXAMPLE, *SUGGESTIONS))
     assert text.endswith(
         "\n"
-        "Suggestion psa-1: Parallel or Selector, shown 31 times\n"
+        "Suggestion psa-1: Parallel or Selector, shown in 31 rows\n"
         "[o] Parallel/Selector\n"
         "│   --> go\n"
         "│   --> beep\n"
@@ -284,7 +284,7 @@ def test_dot_escapes_what_graphviz_would_interpret() -> None:
 def test_dot_draws_suggestions_as_dashed_clusters_and_a_legend_of_what_occurs() -> None:
     dot = render_dot(learned(EXAMPLE, *SUGGESTIONS))
     assert dot.count("style=dashed") == dot.count("subgraph cluster_suggestion_") == 3
-    assert 'label="Suggestion psa-1: Parallel or Selector, shown 31 times"' in dot
+    assert 'label="Suggestion psa-1: Parallel or Selector, shown in 31 rows"' in dot
     assert "old-1" not in dot
     assert dot.count("    legend_") == 7
     assert "legend_psa" not in render_dot(learned(EXAMPLE))

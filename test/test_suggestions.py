@@ -12,10 +12,13 @@ from lat_examples import c, followers, rule
 from test_lat_trees import CONDITIONS, Script, repeater, run, sequence
 
 from rebt_ros.behavior_tree import document, nodes
-from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root, Suggestion, SuggestionKind
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root, Suggestion, SuggestionKind, Unit
+from rebt_ros.behavior_tree.wording import how_often
+from rebt_ros.decision_tree.training import train
 from rebt_ros.errors import OptionError
+from rebt_ros.learning import suggesting
 from rebt_ros.learning.attaching import attach, going_on_after_loops, mark, resolve
-from rebt_ros.learning.options import ALL, PsaChoice
+from rebt_ros.learning.options import ALL, LearnOptions, PsaChoice
 from rebt_ros.learning.suggestions import lat_suggestions, psa_suggestions
 from rebt_ros.paper.lat_trees import gen_lat_trees
 
@@ -181,3 +184,38 @@ def test_the_script_of_these_tests_runs_an_action_for_one_tick() -> None:
     script, statuses = run(some.action("a"), set(), set())
     assert isinstance(script, Script)
     assert [status.name for status in statuses] == ["RUNNING", "SUCCESS"]
+
+
+def test_support_has_a_unit_and_all_kinds_are_compared_by_rows() -> None:
+    two = nodes.Sequence((nodes.Action("a", "action"), nodes.Action("b", "action")))
+    psa = Suggestion("psa-1", SuggestionKind.PSA, 5, nodes.ParallelSelector(two.children))
+    others = [Suggestion("x", kind, 3, two) for kind in SuggestionKind if kind is not psa.kind]
+    assert (psa.kind.unit, psa.rows, how_often(psa)) == (Unit.ROW, 5, "in 5 rows")
+    for one in others:
+        assert (one.kind.unit, one.rows, how_often(one)) == (Unit.TIME, 6, "3 times")
+    assert how_often(replace(psa, support=1)) == "in 1 row"
+    assert how_often(replace(others[0], support=1)) == "1 time"
+
+
+@pytest.mark.parametrize("paper", [True, False])
+def test_suggestions_of_all_kinds_are_ranked_by_the_rows_that_show_them(
+    monkeypatch: pytest.MonkeyPatch, paper: bool
+) -> None:
+    three = tuple(nodes.Action(label, "action") for label in "abc")
+    offered = (
+        Suggestion("psa-1", SuggestionKind.PSA, 8, nodes.ParallelSelector(three)),
+        Suggestion("psa-2", SuggestionKind.PSA, 4, nodes.ParallelSelector(three[1:])),
+        Suggestion("lat-sequence-1", SuggestionKind.LAT_SEQUENCE, 3, nodes.Sequence(three)),
+        Suggestion("lat-repeater-1", SuggestionKind.LAT_REPEATER, 2, nodes.Repeater(three[:1])),
+    )
+    monkeypatch.setattr(suggesting, "_MOST_SUGGESTIONS", 3)
+    monkeypatch.setattr(suggesting, "_of_rules", lambda *arguments: (offered, frozenset(), 0))
+    table = some.table([(0.0,) * 4, (1.0,) * 4], [0, 1])
+    options = LearnOptions.paper() if paper else LearnOptions()
+    found, notes = suggesting.suggest(table, train(table), 0.0, options)
+    if paper:
+        # It offers all there is, in the order of the algorithms.
+        assert (found, notes) == (offered, ())
+    else:
+        assert [one.id for one in found] == ["lat-sequence-1", "psa-1", "psa-2"]
+        assert notes == ("1 more, less supported suggestions are left out",)

@@ -22,6 +22,15 @@ from rebt_ros.logic.conditions import (
 )
 
 
+class Unit(Enum):
+    """What is counted."""
+
+    ROW = "row"
+    """A row of a demonstration in which any of the actions was done."""
+    TIME = "time"
+    """An occurrence from the first action to the last one."""
+
+
 class SuggestionKind(Enum):
     """Kinds of suggested alternate expressive subtrees (SAES)."""
 
@@ -33,6 +42,11 @@ class SuggestionKind(Enum):
     REPEATER = "repeater"
     """A routine that is gone through again and again."""
 
+    @property
+    def unit(self) -> Unit:
+        """What the support of such a suggestion counts."""
+        return Unit.ROW if self is SuggestionKind.PSA else Unit.TIME
+
 
 @dataclass(frozen=True, slots=True)
 class Suggestion:
@@ -41,9 +55,16 @@ class Suggestion:
     id: str
     kind: SuggestionKind
     support: int
-    """How often it occurred in the demonstrations."""
+    """How much of the demonstrations shows it, in the unit of its kind."""
     subtree: nodes.Node
     attached: bool = False
+
+    @property
+    def rows(self) -> int:
+        """In how many rows it was shown at least: each time, each of its actions took a row."""
+        if self.kind.unit is Unit.ROW:
+            return self.support
+        return self.support * sum(isinstance(one, nodes.Action) for one in nodes.walk(self.subtree))
 
 
 class Root(Enum):

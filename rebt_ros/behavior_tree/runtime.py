@@ -1,7 +1,7 @@
 """The behavior tree as a py_trees tree that can be ticked.
 
-The only module of the core that knows py_trees.  Every runtime holds its own state and history:
-py_trees' blackboard, which is one for the whole process, is not used.
+Every runtime holds its own state and history: py_trees' blackboard, which is one for the whole
+process, is not used.
 """
 
 from __future__ import annotations

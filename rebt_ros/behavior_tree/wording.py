@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from enum import Enum
 from fractions import Fraction
 from itertools import pairwise
 
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, SuggestionKind
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, SuggestionKind, Unit
 from rebt_ros.logic.conditions import (
     KNOWN,
     Difference,
@@ -72,9 +73,11 @@ class Wording:
             trees = (shown,)
             actions = nodes.actions(shown)
         self._channels_differ = len({action.channel for action in actions}) > 1
-        self._lat_sequences = {
-            id(one.subtree) for one in suggestions if one.kind is SuggestionKind.LAT_SEQUENCE
-        }
+        lat_sequences = [
+            one.subtree for one in suggestions if one.kind is SuggestionKind.LAT_SEQUENCE
+        ]
+        self._lat_sequences = frozenset(map(_as_suggested, lat_sequences))
+        self._lat_lengths = frozenset(len(nodes.children(one)) for one in lat_sequences)
         thresholds: dict[Quantity, list[float]] = {}
         deciding: dict[str, set[tuple[str, ...]]] = {}
         for tree in trees:
@@ -179,8 +182,39 @@ class Wording:
                 return Kind.PSA
             case nodes.Repeater():
                 return Kind.REPEATER
+            case nodes.Sequence() if self._is_lat_sequence(node):
+                return Kind.LAT_SEQUENCE
             case _:
-                return Kind.LAT_SEQUENCE if id(node) in self._lat_sequences else Kind.CONTROL
+                return Kind.CONTROL
+
+    def _is_lat_sequence(self, node: nodes.Sequence) -> bool:
+        """Whether it is a suggested LAT Sequence, attached or not."""
+        # Most Sequences need not be looked into.
+        return len(node.children) in self._lat_lengths and (
+            _as_suggested(node) in self._lat_sequences
+        )
+
+
+def _as_suggested(tree: nodes.Node) -> nodes.Node:
+    """A subtree without what may change when it is attached.
+
+    A Repeater in it may have got an Inverter, so that the Sequence around it goes on, and the user
+    may have turned PSA nodes into a Selector or a Parallel.
+    """
+    children = tuple(map(_as_suggested, nodes.children(tree)))
+    match tree:
+        case nodes.Inverter(child=nodes.Repeater()):
+            return children[0]
+        case nodes.Inverter():
+            return nodes.Inverter(*children)
+        case nodes.Selector() | nodes.Parallel() if all(
+            isinstance(child, nodes.Action) for child in children
+        ):
+            return nodes.ParallelSelector(children)
+        case nodes.Condition() | nodes.Action():
+            return tree
+        case _:
+            return replace(tree, children=children)
 
 
 def offered(learned: LearnedTree) -> tuple[Suggestion, ...]:
@@ -197,7 +231,13 @@ def heading(suggestion: Suggestion) -> str:
         SuggestionKind.SEQUENCE: "Sequence",
         SuggestionKind.REPEATER: "Repeater",
     }[suggestion.kind]
-    return f"Suggestion {_name(suggestion.id)}: {kind}, shown {_count(suggestion.support, 'time')}"
+    return f"Suggestion {_name(suggestion.id)}: {kind}, shown {how_often(suggestion)}"
+
+
+def how_often(suggestion: Suggestion) -> str:
+    """How much of the demonstrations shows a suggestion, such as "in 5 rows" or "3 times"."""
+    unit = suggestion.kind.unit
+    return f"{'in ' if unit is Unit.ROW else ''}{_count(suggestion.support, unit.value)}"
 
 
 def summary(learned: LearnedTree) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root
+from rebt_ros.behavior_tree.wording import how_often
 from rebt_ros.beyond_the_paper.reductions import Reductions
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import (
@@ -192,7 +193,8 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
         type=Use,
         choices=list(Use),
         metavar=_values(Use),
-        help="whether PSA nodes stand in the tree; auto as above (default: auto)",
+        help="whether PSA nodes stand in the tree; auto: where they raise agreement in "
+        "cross-validation (default: auto)",
     )
     learning.add_argument(
         "--random-state", type=int, default=defaults.random_state, help="default: %(default)s"
@@ -423,7 +425,7 @@ def _suggestions(learned: LearnedTree) -> Iterator[str]:
     for one in learned.suggestions:
         shown = " → ".join(action.label for action in nodes.actions(one.subtree))
         mark = ", attached" if one.attached else ""
-        yield f"  {one.id:<{width}}  {shown}  (seen {one.support} times{mark})"
+        yield f"  {one.id:<{width}}  {shown}  (shown {how_often(one)}{mark})"
 
 
 def _judgement(result: OfflineLearning) -> str:

@@ -1,10 +1,10 @@
 """Choosing what to learn: the pruning level, what a tree may test beside the features, PSA nodes.
 
-All is decided in cross-validation, on rows that a tree was not learned from:
+What cross-validation decides, it decides on rows that a tree was not learned from:
 
 - whether the tree may test the previous action: where that makes the explanation of the rows much
-  simpler, or raises the mean recall of unpruned trees, after their own choices, and makes it no
-  larger (see `FittedTree.explanation`);
+  simpler (see `FittedTree.explanation`), whatever cross-validation says, or makes it no larger and
+  raises the mean recall of unpruned trees after their own choices;
 - whether it may test differences of features, by agreement and size;
 - the pruning level, by mean recall: pruning has to pay (see `selection`);
 - PSA nodes, by own-history agreement.

@@ -21,6 +21,7 @@ import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance, Root
 from rebt_ros.behavior_tree.prediction import (
     Plan,
     States,
@@ -28,9 +29,15 @@ from rebt_ros.behavior_tree.prediction import (
     choose,
     history_columns,
 )
+from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
+
+#: Of trees that are only to be ticked.
+_NOT_LEARNED = Provenance(
+    0, 0, 0.0, None, 0.0, Root.SELECTOR, History.NONE, Figures(0, None, None, 0)
+)
 
 #: Conditions that are told apart by one number each; with more, the kinds are counted anew.
 _MOST_BITS = 30
@@ -52,7 +59,17 @@ def teacher_forced_choices(tree: nodes.Node, table: DemonstrationTable) -> IntAr
 
 
 def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
-    """What the tree chooses in each row after its own choices in the rows before it."""
+    """What the tree chooses in each row after its own choices in the rows before it.
+
+    An action counts as done once it is chosen.  What the tree keeps in mind beside its choices (at
+    which step a Sequence is, that a Repeater runs) it keeps from row to row, as on the robot.
+
+    Returns:
+        Positions in ``table.actions``, `NO_ACTION` where it chooses none, shape (rows,).
+    """
+    tree = executable(tree)
+    if not nodes.is_reactive(tree):
+        return _ticked_choices(tree, table)
     reach = _reach(tree)
     if not reach:
         return teacher_forced_choices(tree, table)
@@ -82,6 +99,30 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
                 label = table.actions[choice]
                 recent = _after(recent, label, reach)
                 chooses = after(label, recent)
+    return np.array(chosen, dtype=np.int64)
+
+
+def _ticked_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
+    """What the tree chooses when it is ticked in one row after the other."""
+    actions = dict.fromkeys((*actions_of(table), *nodes.actions(tree)))
+    learned = LearnedTree(
+        table.features, tuple(actions), tree, _NOT_LEARNED, row_kind=table.row_kind
+    )
+    runtime = TreeRuntime(learned)
+    history = runtime.histories.setdefault(table.channel, ActionHistory())
+    chosen: list[int] = []
+    for row, (starts, state) in enumerate(
+        zip(_starts(table).tolist(), table.states.tolist(), strict=True)
+    ):
+        if starts:
+            runtime.halt()
+            history.clear()
+            for label in _recent_at(row, table):
+                history.begin(label)
+            history.previous = _label(table, table.previous[row])
+        commands = [one for one in runtime.tick(state).commands if one.channel == table.channel]
+        known = commands and commands[0].label in table.actions
+        chosen.append(table.actions.index(commands[0].label) if known else NO_ACTION)
     return np.array(chosen, dtype=np.int64)
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from numbers import Integral, Real
+from typing import Any
 
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.beyond_the_paper.reductions import ALL_REDUCTIONS, Reductions
@@ -25,7 +27,7 @@ class Use(Enum):
     """Whether the executed tree has something."""
 
     AUTO = "auto"
-    """Only where cross-validation speaks for it (see `choosing`)."""
+    """Only where cross-validation speaks for it (see `choice`)."""
     ALWAYS = "always"
     NEVER = "never"
 
@@ -43,8 +45,10 @@ class PsaChoice(Enum):
 class LearnOptions:
     """What section III of the paper leaves to the user, and how to judge the result.
 
+    Enums are also taken by their words, such as ``psa="always"``.
+
     Raises:
-        OptionError: A value out of its range.
+        OptionError: A value of the wrong type, or out of its range.
     """
 
     delta: float = 0.3
@@ -53,7 +57,8 @@ class LearnOptions:
     """Whether PSA nodes stand in the executed tree."""
     history: History | None = None
     """What the executed tree may test of what was done before; None to choose between the previous
-    action and nothing by cross-validation (paper: LAT)."""
+    action and nothing by how simple the rows are to explain and, if that leaves it open, by
+    cross-validation (paper: LAT)."""
     differences: Use = Use.AUTO
     """Whether the executed tree may test the difference of two features."""
     units: Mapping[str, str] = field(default_factory=dict)
@@ -68,14 +73,16 @@ class LearnOptions:
     """Number of the pruning level, 0 prunes nothing, instead of a complexity parameter."""
     root: Root = Root.SELECTOR
     reductions: Reductions | None = ALL_REDUCTIONS
-    """Reductions past the paper; None for Algorithm 1 as printed."""
+    """Reductions past the paper; None for those of Algorithm 1 alone, and for the paper's mode of
+    everything else: see `is_paper`."""
     test_fraction: float = 0.25
     """Share of the rows, or of the demonstrations if several, that is held out; in [0, 1)."""
     refit: bool = True
     """Whether the tree is learned from all rows in the end, once it has been judged."""
     simplest: bool = True
     """Whether, of the trees that fit the rows, the simplest one is searched for, instead of the
-    one that is grown greedily; in trees of up to 30 leaves."""
+    one that is grown greedily: of up to 5000 rows, and in trees of up to 30 leaves with at least
+    10 rows for each."""
     readable_thresholds: bool = True
     """Whether thresholds are moved to round values that splits share, within the gaps between the
     rows that were shown."""
@@ -97,6 +104,8 @@ class LearnOptions:
 
     def __post_init__(self) -> None:
         self._take_words()
+        self._take_numbers()
+        self._take_the_others()
         if not 0 <= self.delta <= 1:
             raise OptionError(f"delta must lie between 0 and 1, not at {self.delta:g}.")
         if self.max_depth is not None and self.max_depth < 1:
@@ -133,12 +142,47 @@ class LearnOptions:
             elif not isinstance(value, kind):
                 known = ", ".join(words)
                 raise OptionError(f"{name} must be one of {known}, not {value!r}.")
-        if isinstance(self.attach, str):
-            object.__setattr__(self, "attach", (self.attach,))
+
+    def _take_numbers(self) -> None:
+        """Takes numbers of any library for Python's."""
+        kinds: tuple[tuple[tuple[str, ...], type, Callable[[Any], float], str], ...] = (
+            (_NUMBERS, Real, float, "a number"),
+            (_WHOLE_NUMBERS, Integral, int, "a whole number"),
+        )
+        for names, kind, made, words in kinds:
+            for name in names:
+                value = getattr(self, name)
+                if value is None and name in _LEFT_OPEN:
+                    continue
+                if isinstance(value, bool) or not isinstance(value, kind):
+                    open_too = " or None" if name in _LEFT_OPEN else ""
+                    raise OptionError(f"{name} must be {words}{open_too}, not {value!r}.")
+                try:
+                    object.__setattr__(self, name, made(value))
+                except OverflowError as err:
+                    raise OptionError(f"{name} is far too large.") from err
+
+    def _take_the_others(self) -> None:
+        for name in _SWITCHES:
+            if not isinstance(value := getattr(self, name), bool):
+                raise OptionError(f"{name} must be True or False, not {value!r}.")
+        if not isinstance(self.reductions, Reductions | None):
+            raise OptionError(f"reductions must be Reductions or None, not {self.reductions!r}.")
+        ids = (self.attach,) if isinstance(self.attach, str) else self.attach
+        if not isinstance(ids, tuple | list) or not _are_texts(ids):
+            raise OptionError(f"attach must be ids of suggestions, not {ids!r}.")
+        object.__setattr__(self, "attach", tuple(ids))
+        units = self.units
+        if not isinstance(units, Mapping) or not _are_texts([*units, *units.values()]):
+            raise OptionError(f"units must be units by names of features, not {units!r}.")
 
     @property
     def is_paper(self) -> bool:
-        """Whether Algorithms 1 and 2 are followed as printed."""
+        """Whether no reduction past the paper is made, and suggestions are those of Algorithm 2.
+
+        They are then more than twelve, from trees of any size and with 24 Repeaters of single loops
+        at most, and are attached behind the rules.  `paper` sets all other options as well.
+        """
         return self.reductions is None
 
     @classmethod
@@ -170,7 +214,18 @@ _ENUMS: Mapping[str, type[Enum]] = {
     "upsample": Upsampling,
     "psa_choice": PsaChoice,
 }
+#: Options that are numbers, and those that say yes or no.
+_NUMBERS = ("delta", "ccp_alpha", "test_fraction", "reaction_time")
+_WHOLE_NUMBERS = ("max_depth", "level", "random_state", "lags")
+_SWITCHES = ("refit", "simplest", "readable_thresholds", "routines")
+#: Numbers that may be None.
+_LEFT_OPEN = frozenset({"ccp_alpha", "reaction_time", "max_depth", "level"})
 #: Those that are None where nobody chose.
 _CHOSEN = frozenset({"history", "psa_choice"})
+
+
+def _are_texts(values: Iterable[object]) -> bool:
+    return all(isinstance(value, str) for value in values)
+
 
 DEFAULTS = LearnOptions()

@@ -69,8 +69,8 @@ def suggest(
             trees are learned from it.
 
     Returns:
-        At most twelve suggestions, routines first, then the best supported (all of them in the
-        paper's mode), and notes on what was left out.
+        At most twelve suggestions, routines first, then those that were shown in most rows (all of
+        them in the paper's mode), and notes on what was left out.
     """
     found = routine_suggestions(routines[:_MOST_ROUTINES])
     left_out = len(routines) - len(found)
@@ -92,7 +92,7 @@ def suggest(
     left_out += not_built
     room = _MOST_SUGGESTIONS - len(found)
     if not options.is_paper and len(offered) > room:
-        ranked = sorted(offered, key=lambda one: (one.subtree not in loops, -one.support))
+        ranked = sorted(offered, key=lambda one: (one.subtree not in loops, -one.rows))
         left_out += len(ranked) - room
         offered = tuple(ranked[:room])
     notes = _on_left_out(left_out)

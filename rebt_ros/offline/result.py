@@ -84,6 +84,7 @@ def summarize(result: OfflineLearning) -> dict[str, Any]:
                 "id": one.id,
                 "kind": one.kind.value,
                 "support": one.support,
+                "unit": one.kind.unit.value,
                 "nodes": nodes.size(one.subtree),
                 "attached": one.attached,
             }

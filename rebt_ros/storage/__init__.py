@@ -1,10 +1,10 @@
 """Files: everything that turns them into `Demonstration` values, and rows and trees into files.
 
 CSV table
-    Any table with one row per action event; one column holds the action.
+    Any table with an event or a sample per row; one column, or several, hold the actions.
 recording
-    The recorder's own durable format: one CSV file per demonstration, with a line of JSON at its
-    top that says where its columns came from.
+    The recorder's own durable format: one file per demonstration, binary but for a line of JSON at
+    its top that says where its columns came from.
 bag
     A rosbag2 recording of state and action topics (a directory, an .mcap or a .db3 file).
 input
