@@ -14,6 +14,8 @@ import pytest
 
 import rebt_ros
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.beyond_the_paper import reductions
+from rebt_ros.beyond_the_paper.reductions import Reductions
 from rebt_ros.commands import learn as learn_command
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.last_action import History
@@ -178,6 +180,15 @@ def test_large_trees_are_made_without_the_slow_reduction_and_stay_faithful() -> 
     assert not level.reduced
     assert level.learned.provenance.figures.fidelity_mismatches == 0
     assert every.level(len(every.ccp_alphas) - 1).reduced
+
+
+@pytest.mark.parametrize("asked", [None, Reductions(domain=False)])
+def test_what_nobody_asked_for_is_not_missing(
+    asked: Reductions | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reductions, "MOST_LEAVES_BY_DOMAIN", 1)
+    assert not family(rows=40).level(0).reduced
+    assert family(replace(OPTIONS, reductions=asked), rows=40).level(0).reduced
 
 
 # --- which levels -------------------------------------------------------------------------------

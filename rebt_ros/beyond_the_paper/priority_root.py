@@ -18,7 +18,6 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.beyond_the_paper.reductions import (
     ALL_REDUCTIONS,
-    MOST_LEAVES_BY_DOMAIN,
     MOST_LEAVES_IN_BEST_ORDER,
     MOST_LEAVES_MINIMIZED,
     Reductions,
@@ -51,7 +50,8 @@ def reduced_tree(
 
     Args:
         rules: From `leaf_rules`: no two share a state, and together they cover all of them.
-        reductions: What to do; priority is for Selectors only.
+        reductions: What to do, as far as the tree's size allows (see `Reductions.made_in`);
+            priority is for Selectors only.
         root: Kind of the root node.
     """
     leaves = sum(len(rule.dnf) for rule in rules)
@@ -63,7 +63,7 @@ def reduced_tree(
     inside = [cubes(one, width) for one in covers] if is_minimized else []
     impossible = cubes((), width)
     outside = inside
-    if reductions.domain and leaves <= MOST_LEAVES_BY_DOMAIN:
+    if reductions.made_in(leaves).domain:
         impossible = cubes(numbering.cover(infeasible(numbering.conditions)), width)
         spelled = (spelled_out(rule.dnf, numbering.conditions) for rule in rules)
         outside = [cubes(numbering.cover(one), width) for one in spelled]

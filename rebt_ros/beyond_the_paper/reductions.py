@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 #: Decision trees with more leaves are minimized without the domain's don't-cares, whose number and
 #: entanglement make espresso take minutes there.
@@ -26,6 +26,10 @@ class Reductions:
     """Rules stand in order of priority, with the states of earlier ones as don't-cares."""
     intervals: bool = True
     """Two thresholds that enclose a feature are one condition."""
+
+    def made_in(self, leaves: int) -> Reductions:
+        """Those of these that are made of a decision tree with so many leaves."""
+        return replace(self, domain=self.domain and leaves <= MOST_LEAVES_BY_DOMAIN)
 
 
 ALL_REDUCTIONS = Reductions()

@@ -13,7 +13,6 @@ import numpy as np
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Figures, LearnedTree, Provenance
-from rebt_ros.beyond_the_paper.reductions import MOST_LEAVES_BY_DOMAIN
 from rebt_ros.decision_tree.fitted import FittedTree, TrainedTree
 from rebt_ros.decision_tree.shown_rows import shown_rows
 from rebt_ros.decision_tree.tree import DecisionTree
@@ -112,7 +111,7 @@ class Level:
     chosen: bool
     best: bool
     reduced: bool
-    """Whether all reductions were made that were asked for."""
+    """Whether all reductions were made that were asked for, if any were."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -167,6 +166,7 @@ class Levels:
         leaves = int(self.leaves[number])
         # Suggestions belong to the published tree.
         options = replace(self.evidence.options, attach=())
+        asked = options.reductions
         resolved, _ = accept(tree.learned.tree, (), options)
         return Level(
             number,
@@ -177,7 +177,7 @@ class Levels:
             self._cross_validated(ccp_alpha),
             number == self.chosen,
             number == self.best,
-            leaves <= MOST_LEAVES_BY_DOMAIN,
+            asked is None or asked.made_in(leaves) == asked,
         )
 
     def _cross_validated(self, ccp_alpha: float) -> CrossValidated | None:
