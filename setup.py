@@ -108,6 +108,7 @@ setup(
             f"generate = {PACKAGE}.commands.generate:main",
             f"learn = {PACKAGE}.commands.learn:main",
             f"replay = {PACKAGE}.commands.replay:main",
+            f"revise = {PACKAGE}.commands.revise:main",
             f"show = {PACKAGE}.commands.show:main",
             f"simulate = {PACKAGE}.commands.simulate:main",
             f"trial = {PACKAGE}.commands.trial:main",

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from rebt_ros.demonstration.schema import Feature, FeatureKind
     from rebt_ros.errors import DocumentError, InputError, OptionError, RebtError
     from rebt_ros.learning.learning import Learning
+    from rebt_ros.learning.learning_file import load_learning
     from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
     from rebt_ros.learning.policy import Decision, Policy, State
     from rebt_ros.learning.progress import Progress
@@ -54,7 +55,6 @@ if TYPE_CHECKING:
         PreviousActionIs,
         Threshold,
     )
-    from rebt_ros.offline.learning_file import load_learning
     from rebt_ros.offline.learning_from_files import learn
     from rebt_ros.offline.replay_over_files import replay
     from rebt_ros.offline.result import OfflineLearning
@@ -171,7 +171,7 @@ _HOMES = {
     "Upsampling": "rebt_ros.decision_tree.upsampling",
     "Use": "rebt_ros.learning.options",
     "learn": "rebt_ros.offline.learning_from_files",
-    "load_learning": "rebt_ros.offline.learning_file",
+    "load_learning": "rebt_ros.learning.learning_file",
     "replay": "rebt_ros.offline.replay_over_files",
 }
 

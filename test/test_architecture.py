@@ -63,7 +63,7 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 HOMES: Final = {
     "apsw": ("rebt_ros.storage.bag_safety",),
     "distributed": ("rebt_ros.study.workers",),
-    "imblearn": ("rebt_ros.decision_tree.upsampling",),
+    "imblearn": ("rebt_ros.decision_tree.svm_smote",),
     "jsonschema": (),
     "joblib": ("rebt_ros.commands.bench_*", "rebt_ros.study.workers"),
     "matplotlib": ("rebt_ros.drawing.*",),
@@ -196,6 +196,37 @@ def test_imports_go_downwards_only() -> None:
     assert upwards == []
 
 
+#: Modules on the longest way from an import to what it leads to.
+LONGEST_CHAIN: Final = 12
+
+
+def test_no_chain_of_imports_is_longer_than_twelve_modules() -> None:
+    assert max(map(_chain, MODULES), key=len, default=[])[LONGEST_CHAIN:] == []
+
+
+def _chain(module: Module) -> list[str]:
+    """The longest way down from a module."""
+    return list(_longest(module.name))
+
+
+@cache
+def _longest(name: str) -> tuple[str, ...]:
+    own = {module.name: module for module in MODULES}
+    below = {
+        target
+        for _, full in own[name].imports
+        for target in (full, full.rpartition(".")[0])
+        if target in own
+        and target not in (name, PACKAGE)
+        and own[target].path.name != "__init__.py"
+    }
+    return (name, *max(map(_longest, sorted(below)), key=len, default=()))
+
+
+def test_replay_starts_without_scikit_learn() -> None:
+    _run("import sys; sys.modules['sklearn'] = None; import rebt_ros.commands.replay")
+
+
 def test_only_the_shells_know_ros() -> None:
     strays = [
         f"{module}:{line}: {name}"
@@ -258,7 +289,7 @@ def test_the_core_runs_where_ros_is_not_installed() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["experiment", "generate", "learn", "replay", "show", "simulate", "trial"]
+    "command", ["experiment", "generate", "learn", "replay", "revise", "show", "simulate", "trial"]
 )
 def test_offline_commands_need_no_ros(command: str) -> None:
     _run(f"{WITHOUT_ROS} importlib.import_module('rebt_ros.commands.{command}')")

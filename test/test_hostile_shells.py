@@ -13,7 +13,17 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 ROWS = "".join(
     f"{x / 10},{'no' if x % 3 else 'yes'},{'go' if x < 20 else 'turn'}\n" for x in range(40)
 )
-COMMANDS = ("demo", "experiment", "generate", "learn", "replay", "show", "simulate", "trial")
+COMMANDS = (
+    "demo",
+    "experiment",
+    "generate",
+    "learn",
+    "replay",
+    "revise",
+    "show",
+    "simulate",
+    "trial",
+)
 NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
 
 

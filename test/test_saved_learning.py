@@ -19,15 +19,15 @@ import rebt_ros
 from rebt_ros.behavior_tree import nodes, paths
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.commands.revise import main as revise_command
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.learning.learning import Learning
+from rebt_ros.learning.learning_file import Saved, load_learning, restored, saved, write_learning
 from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
 from rebt_ros.learning.pipeline import learn_from
-from rebt_ros.learning.saved import Saved, restored, saved
-from rebt_ros.offline.learning_file import load_learning, write_learning
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 
@@ -181,7 +181,7 @@ def test_learning_from_files_writes_it_and_large_tables_say_that_there_is_none(
     table.write_text("x,y,action\n" + "".join(rows))
     result = rebt_ros.learn(table, out=tmp_path / "out")
     assert dumps(rebt_ros.load_learning(tmp_path / "out").learned) == dumps(result.learned)
-    monkeypatch.setattr("rebt_ros.learning.saved.MOST_VALUES", 100)
+    monkeypatch.setattr("rebt_ros.learning.learning_file.MOST_VALUES", 100)
     result = rebt_ros.learn(table, out=tmp_path / "out")
     assert "there is no learning.npz, as the table is too large for it" in result.notes
     assert not (tmp_path / "out" / "learning.npz").exists()
@@ -259,3 +259,32 @@ def test_parts_that_do_not_fit_are_refused_and_never_crash(data: st.DataObject) 
 
 
 SAVED = saved(learned()) or Saved({}, {})
+
+
+# --- the command --------------------------------------------------------------------------------
+
+
+def revise(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
+    revise_command([str(argument) for argument in arguments])
+    return capsys.readouterr().out
+
+
+def test_revise_lists_what_can_be_changed_and_changes_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = learned()
+    write_learning(tmp_path, mine)
+    first = mine.learned.suggestions[0].id
+    listed = revise(capsys, tmp_path)
+    assert f"--attach {first}" in listed
+    assert "(taken)" in listed
+    assert [path.name for path in tmp_path.iterdir()] == ["learning.npz"]
+    revise(capsys, tmp_path, "--attach", first, "--out", tmp_path / "other")
+    attached = loads((tmp_path / "other" / "tree.json").read_text())
+    assert attached == mine.with_attached(first).learned
+    assert "attached" in revise(capsys, tmp_path / "other")
+    revise(capsys, tmp_path / "other" / "learning.npz", "--detach", "all")
+    assert loads((tmp_path / "other" / "tree.json").read_text()) == mine.learned
+    with pytest.raises(SystemExit):
+        revise(capsys, tmp_path, "--level", "999")
+    assert capsys.readouterr().err.startswith("revise: there is no pruning level 999")

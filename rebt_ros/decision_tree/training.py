@@ -25,7 +25,8 @@ from rebt_ros.decision_tree.encoding import (
 from rebt_ros.decision_tree.fitted import FittedTree, TrainedTree
 from rebt_ros.decision_tree.grown import GrownTree
 from rebt_ros.decision_tree.pruning import pruning_path
-from rebt_ros.decision_tree.upsampling import Upsampled, Upsampling, svm_smote
+from rebt_ros.decision_tree.svm_smote import Upsampled, svm_smote
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 

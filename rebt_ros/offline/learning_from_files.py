@@ -14,10 +14,10 @@ from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import InputError
 from rebt_ros.learning import pipeline
+from rebt_ros.learning.learning_file import write_learning
 from rebt_ros.learning.levels import check_most_levels
 from rebt_ros.learning.options import LearnOptions
 from rebt_ros.learning.progress import Progress
-from rebt_ros.offline.learning_file import write_learning
 from rebt_ros.offline.level_files import (
     channel_directories,
     clear_levels,

@@ -1,10 +1,11 @@
-"""A `Learning` as plain arrays and words, from which it comes back without learning again."""
+"""The file beside tree.json from which a `Learning` comes back without learning again."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,10 @@ from rebt_ros.learning.learning import Learning, learned_as_asked
 from rebt_ros.learning.levels import Evidence
 from rebt_ros.learning.options import LearnOptions, PsaChoice
 from rebt_ros.logic.conditions import Difference
+from rebt_ros.storage.array_file import read_arrays, write_arrays
+
+#: Its name.
+NAME = "learning.npz"
 
 #: Of the words and arrays below.
 VERSION = 1
@@ -37,6 +42,43 @@ MOST_VALUES = 2_000_000
 _TREE = ("left", "right", "column", "threshold", "counts", "risk")
 _TABLE = ("states", "chosen", "demonstration", "stamps", "previous")
 _LEVELS = ("ccp_alphas", "hits", "shown")
+
+
+def write_learning(directory: Path, learning: Learning) -> tuple[str, ...]:
+    """Writes learning.npz, or takes an older one away where the table is too large for it.
+
+    Returns:
+        Notes; no full stops.
+
+    Raises:
+        StorageError: It cannot be written.
+    """
+    path = directory / NAME
+    kept = saved(learning)
+    if kept is None:
+        path.unlink(missing_ok=True)
+        return (f"there is no {NAME}, as the table is too large for it",)
+    write_arrays(path, kept.words, kept.arrays)
+    return ()
+
+
+def load_learning(path: str | Path) -> Learning:
+    """A learned policy as it was when it was written, without learning again.
+
+    Args:
+        path: learning.npz, or the directory that `learn` wrote it to.
+
+    Raises:
+        InputError: There is no such file, or it cannot be used.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / NAME
+    words, arrays = read_arrays(path)
+    try:
+        return restored(Saved(words, arrays))
+    except InputError as err:
+        raise InputError(f"{path} cannot be used: {err}") from err
 
 
 @dataclass(frozen=True, eq=False, slots=True)
