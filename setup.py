@@ -72,7 +72,11 @@ setup(
     maintainer_email="maintainers@rebt-ros.org",
     license="Apache-2.0",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed"], f"{PACKAGE}.behavior_tree": ["*.schema.json"]},
+    package_data={
+        PACKAGE: ["py.typed"],
+        f"{PACKAGE}.behavior_tree": ["*.schema.json"],
+        f"{PACKAGE}.robot_file": ["*.schema.json"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
@@ -88,6 +92,7 @@ setup(
         "numpy>=1.26",
         "py_trees>=2.3",
         "pyeda>=0.29",
+        "pyyaml>=6",
         "rosbags>=0.11",
         "scikit-learn>=1.4",
         "scipy>=1.11",

@@ -34,6 +34,7 @@ LAYERS: Final = (
     {"paper"},
     {"decision_tree"},
     {"behavior_tree"},
+    {"robot_file"},
     {"demonstration"},
     {"logic", "message_path"},
     {"errors", "arrays", "streams"},

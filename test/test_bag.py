@@ -16,7 +16,7 @@ from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.fields import Dimension, fields_of
 from rebt_ros.errors import InputError, OptionError
-from rebt_ros.storage.bag import STATE_TYPE, _States, _UndecodableError, read_bag
+from rebt_ros.storage.bag import STATE_TYPE, UndecodableError, _States, read_bag
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 STATE = "std_msgs/msg/Float64MultiArray"
@@ -379,5 +379,5 @@ def test_a_state_cut_short_is_not_read_as_one_that_was_read_before() -> None:
     message = types.types[STATE_TYPE](layout=layout, data=np.array([1.0, 2.0]))
     data = bytes(types.serialize_cdr(message, STATE_TYPE))
     assert states.read(data) == states.read(data) == ((1.0, 2.0), ())
-    with pytest.raises(_UndecodableError):
+    with pytest.raises(UndecodableError):
         states.read(data[:-8])

@@ -34,6 +34,7 @@ DECLARED_AS: Final = {
     "rosbags": ("python3-rosbags-pip", "rosbags"),
     "scipy": ("python3-scipy", "scipy"),
     "sklearn": ("python3-sklearn", "scikit-learn"),
+    "yaml": ("python3-yaml", "pyyaml"),
 }
 
 #: Imported only where they are installed.

@@ -49,12 +49,22 @@ from rebt_ros.logic.conditions import (
     Quantity,
     Threshold,
 )
+from rebt_ros.robot_file.errors import RobotFileError
+from rebt_ros.robot_file.reading import robot_file_of
+from rebt_ros.robot_file.robot_file import RobotFile
 
 FORMAT = "rebt_ros/behavior_tree"
 #: Version 1 had no ``shown``, and version 2 did not say what a row is; both are read still.
 VERSION = 3
+#: The same with a robot file.
+ROBOT_VERSION = 4
 #: The fields that each version has beside those of version 1.
-_ADDED: Mapping[int, tuple[str, ...]] = {1: (), 2: ("shown",), VERSION: ("shown", "row_kind")}
+_ADDED: Mapping[int, tuple[str, ...]] = {
+    1: (),
+    2: ("shown",),
+    VERSION: ("shown", "row_kind"),
+    ROBOT_VERSION: ("shown", "row_kind", "robot"),
+}
 
 #: Longest document that is read, in characters.
 LARGEST_DOCUMENT = 4_000_000
@@ -127,9 +137,11 @@ def _refuse_constant(name: str) -> NoReturn:
 
 
 def _encode(learned: LearnedTree) -> Json:
+    robot = learned.robot
     return {
         "format": FORMAT,
-        "version": VERSION,
+        "version": VERSION if robot is None else ROBOT_VERSION,
+        **({} if robot is None else {"robot": robot.content}),
         "row_kind": learned.row_kind.value,
         "features": [_encode_feature(feature) for feature in learned.features],
         "actions": [{"label": one.label, "channel": one.channel} for one in learned.actions],
@@ -374,9 +386,17 @@ def _learned_tree(place: _Place) -> LearnedTree:
             suggestions=fields["suggestions"].items(_suggestion),
             shown=fields["shown"].items(_shown_channel) if "shown" in fields else (),
             row_kind=fields["row_kind"].one_of(RowKind) if "row_kind" in fields else RowKind.EVENT,
+            robot=_robot(fields["robot"]) if "robot" in fields else None,
         )
     except ValueError as err:
         raise DocumentError(f"the document contradicts itself: {_cut(str(err), 200)}.") from err
+
+
+def _robot(place: _Place) -> RobotFile:
+    try:
+        return robot_file_of(place.value, "the document's robot file")
+    except RobotFileError as err:
+        raise DocumentError(str(err)) from err
 
 
 def _feature(place: _Place) -> Feature:

@@ -20,6 +20,7 @@ from rebt_ros.logic.conditions import (
     Threshold,
     features_of,
 )
+from rebt_ros.robot_file.robot_file import RobotFile
 
 
 class Unit(Enum):
@@ -147,6 +148,8 @@ class LearnedTree:
     """What each channel was learned from, leaf by leaf; empty where that is not known."""
     row_kind: RowKind = RowKind.EVENT
     """What the previous action is when the tree runs: see `TreeRuntime`."""
+    robot: RobotFile | None = None
+    """Where its features are in messages of any type; None where topics carry them as they are."""
 
     def __post_init__(self) -> None:
         for problem in self._problems():
@@ -169,7 +172,12 @@ class LearnedTree:
 
 
 def unmeasurable(learned: LearnedTree) -> tuple[Feature, ...]:
-    """The features that the tree tests for a text, which no topic of numbers can carry."""
+    """The features that the tree tests for a text, which no topic of numbers can carry.
+
+    None where the tree says where they are in messages of any type.
+    """
+    if learned.robot is not None:
+        return ()
     tested = {
         (condition.feature, condition.category)
         for node in nodes.conditions(learned.tree)

@@ -12,6 +12,7 @@ from rebt_ros import streams
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.errors import RebtError
+from rebt_ros.robot_file.reading import read_robot_file
 from rebt_ros.storage.inputs import InputOptions
 
 #: Exit codes of a failure that the user can mend, and of Ctrl-C (128 + SIGINT).
@@ -134,6 +135,13 @@ def add_input_options(parser: argparse.ArgumentParser) -> None:
         help="rows per second while an action holds (default: one row per action message)",
     )
     bags.add_argument(
+        "--robot",
+        type=Path,
+        metavar="FILE",
+        help="robot file that says where features and actions are in messages of any type, instead "
+        "of topics (docs/robot_file.md)",
+    )
+    bags.add_argument(
         "--skip-bad", action="store_true", help="leave out malformed messages instead of refusing"
     )
 
@@ -148,6 +156,7 @@ def input_options(arguments: argparse.Namespace) -> InputOptions:
         action_topics=tuple(arguments.action_topic),
         sample_rate=arguments.sample_rate,
         skip_bad=arguments.skip_bad,
+        robot=read_robot_file(arguments.robot) if arguments.robot else None,
     )
 
 

@@ -55,6 +55,8 @@ class StateTopic:
     name: str
     fields: tuple[str, ...] = ()
     """Names of its values; empty: taken from the first message's labels, else from the index."""
+    may_miss: bool = False
+    """Whether values may be missing, as NaN; else a message with such a value is refused."""
 
     def __post_init__(self) -> None:
         if len(set(self.fields)) != len(self.fields):
@@ -102,6 +104,7 @@ class DemonstrationBuilder:
                 f"second, not at {sample_rate}."
             )
         self._fields: dict[str, tuple[str, ...]] = {one.name: one.fields for one in topics}
+        self._may_miss = frozenset(one.name for one in topics if one.may_miss)
         self._latest: dict[str, tuple[float, ...]] = {}
         self._recent = {} if recent is None else recent
         self._features: tuple[Feature, ...] | None = None
@@ -242,6 +245,8 @@ class DemonstrationBuilder:
         ):
             return
         for index, value in enumerate(state):
+            if math.isnan(value) and topic in self._may_miss:
+                continue
             if not math.isfinite(value):
                 raise BadMessageError(
                     Fault.NOT_FINITE,

@@ -44,6 +44,8 @@ class DemonstrationTable:
     """Position in `actions` of the action of the row before, `NO_ACTION` in a demonstration's first
     row, shape (rows,); None to derive it from `chosen`."""
     row_kind: RowKind = RowKind.EVENT
+    robot: object = None
+    """The `RobotFile` by which its rows were read, for trees to carry; None without one."""
 
     def __post_init__(self) -> None:
         if self.previous is None:

@@ -157,6 +157,7 @@ def _restored(words: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) 
         before=_of(arrays, "table.before", np.int64) if "table.before" in arrays else None,
         previous=_of(arrays, "table.previous", np.int64),
         row_kind=plain.row_kind,
+        robot=plain.robot,
     )
     _check_table(table)
     held_out = _of(arrays, "held_out", np.bool_)

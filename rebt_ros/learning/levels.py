@@ -25,6 +25,7 @@ from rebt_ros.learning.attaching import accept
 from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.conversion import convert, own_history_choices
 from rebt_ros.learning.options import LearnOptions
+from rebt_ros.robot_file.robot_file import RobotFile
 
 #: The first, the last, the best and the chosen level are always among them.
 FEWEST_LEVELS = 4
@@ -243,6 +244,7 @@ def as_learned(
             figures=figures,
         ),
         row_kind=table.row_kind,
+        robot=table.robot if isinstance(table.robot, RobotFile) else None,
     )
 
 

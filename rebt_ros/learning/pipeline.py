@@ -146,6 +146,8 @@ def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
             for suggestion in one.suggestions
         ),
         tuple(channel for one in trees for channel in one.shown),
+        row_kind=first.row_kind,
+        robot=first.robot,
     )
 
 

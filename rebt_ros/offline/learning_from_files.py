@@ -75,7 +75,9 @@ def learn(
     paths = as_paths(inputs)
     reading = reading or InputOptions()
     loaded = load(paths, replace(reading, features=reading.features | frozenset(declared or ())))
-    tables = tabulate(loaded.demonstrations, declared)
+    tables = tuple(
+        replace(table, robot=loaded.robot) for table in tabulate(loaded.demonstrations, declared)
+    )
     learning = _part(progress, 0.0, _LEARNING_SHARE) if levels else progress
     for table in tables:
         _refuse_what_are_no_actions(table)

@@ -10,7 +10,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.learning.replaying import Replay
 from rebt_ros.learning.replaying import replay as replay_demonstrations
-from rebt_ros.storage.inputs import InputOptions, as_paths, load
+from rebt_ros.storage.inputs import InputOptions, as_paths, holds_bags, load
 from rebt_ros.storage.tree_file import read_tree
 
 
@@ -26,7 +26,7 @@ def replay(
         tree: A learned tree, or the file of one.
         inputs: Each one or more demonstrations; or the only one.
         reading: How to read the inputs.  Label columns of tables need not be named where they are
-            called like the tree's channels.
+            called like the tree's channels, and no topics where the tree has a robot file.
 
     Returns:
         One for each channel of the tree that was recorded.
@@ -38,7 +38,10 @@ def replay(
     reading = reading or InputOptions()
     names = frozenset(feature.name for feature in learned.features)
     reading = replace(reading, features=reading.features | names)
+    paths = as_paths(inputs)
+    if learned.robot is not None and reading.robot is None and holds_bags(paths):
+        reading = replace(reading, robot=learned.robot)
     policies = tuple(nodes.policies(learned.tree))
     if len(policies) > 1:
         reading = replace(reading, channels=reading.channels or policies)
-    return replay_demonstrations(learned, load(as_paths(inputs), reading).demonstrations)
+    return replay_demonstrations(learned, load(paths, reading).demonstrations)

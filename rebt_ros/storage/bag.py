@@ -24,7 +24,7 @@ from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.fields import ArrayMessage, names_of, values_of
 from rebt_ros.errors import InputError
 from rebt_ros.storage.account import Account
-from rebt_ros.storage.bag_files import GAP, BagFiles, Topic, explained, opened_bag
+from rebt_ros.storage.bag_files import GAP, BagFiles, Message, Topic, explained, opened_bag
 from rebt_ros.storage.bag_safety import check_expansion, expansion
 from rebt_ros.storage.packing import ZSTD_MAGIC, unzstd
 from rebt_ros.storage.read import Read
@@ -36,7 +36,7 @@ ACTION_TYPE = "std_msgs/msg/String"
 _LONGEST_LIST: Final = 500
 
 #: Later than any clock tells (nanoseconds): stamps are signed 64-bit numbers.
-_LATEST = 2**63
+LATEST = 2**63
 
 
 def read_bag(
@@ -68,8 +68,8 @@ def read_bag(
     """
     with opened_bag(path) as bag:
         names = [one.name for one in state_topics]
-        with _with_notes(bag):
-            kinds = _topics(bag)
+        with with_notes(bag):
+            kinds = kinds_of(bag)
             if not kinds:
                 raise InputError(f"{path} holds no messages: record state and action topics first.")
             states = _chosen(path, kinds, names, STATE_TYPE, "state")
@@ -81,13 +81,11 @@ def read_bag(
         )
         builder = DemonstrationBuilder(topics, actions, sample_rate)
         wanted = {*((one, STATE_TYPE) for one in states), *((one, ACTION_TYPE) for one in actions)}
-        feed = _Feed(
-            path, builder, skip_bad, {name: bag.found[name, STATE_TYPE] for name in states}
-        )
-        rows = (row for message in _messages(path, bag, wanted) for row in feed.rows_of(*message))
+        feed = Feed(path, builder, skip_bad, {name: bag.found[name, STATE_TYPE] for name in states})
+        rows = (row for message in messages_of(path, bag, wanted) for row in feed.rows_of(*message))
         first = next(rows, None)
         if first is None or builder.features is None:
-            with _with_notes(bag):
+            with with_notes(bag):
                 raise InputError(f"{path} gives no rows: {feed.why_no_rows(states, actions)}.")
         demonstration = Demonstration.from_rows(
             path.absolute().name,
@@ -96,12 +94,12 @@ def read_bag(
             RowKind.EVENT if sample_rate is None else RowKind.SAMPLE,
         )
         stated = sum(bag.stated.get(topic, bag.found[topic]) for topic in wanted)
-        notes = (*bag.notes, *_differences(bag, wanted), *feed.notes())
+        notes = (*bag.notes, *differences(bag, wanted), *feed.notes())
     return Read(demonstration, notes, feed.account(stated, demonstration))
 
 
 @dataclass(slots=True)
-class _Feed:
+class Feed:
     """Hands messages to the builder and counts those that it does not take."""
 
     path: Path
@@ -122,35 +120,40 @@ class _Feed:
     """What was wrong with the messages that were left out."""
 
     def rows_of(self, topic: Topic, stamp: int, data: bytes) -> tuple[Row, ...]:
+        """The rows that a message completes; none where it is left out.
+
+        Raises:
+            InputError: It cannot be used, and such messages are not left out.
+        """
         if topic == GAP:
             # A topic on which nothing more comes still has its value, as far as can be known.
             self.unknown = {name for name, count in self.there.items() if self.seen[name] < count}
             return ()
         name, kind = topic
         self.seen[name] += 1
-        if kind == STATE_TYPE:
+        if name in self.there:
             self.unknown.discard(name)
         elif self.unknown:
             self.stale += 1
             return ()
         try:
-            return self._pushed(topic, stamp, data)
+            return self.pushed(topic, stamp, data)
         except BadMessageError as err:
             if err.fault is Fault.NO_STATE:
                 self.early += 1
                 return ()
             problem = InputError(f"{self.path}, message {self.seen[name]} on {name!r}: {err}")
             problem.__cause__ = err
-        except _UndecodableError as err:
+        except UndecodableError as err:
             problem = InputError(
                 f"{self.path}, message {self.seen[name]} on {name!r} cannot be decoded as "
                 f"{kind}: record the topic again."
             )
             problem.__cause__ = err
-        except _TooLargeError as err:
+        except TooLargeError as err:
             problem = InputError(f"{self.path}, message {self.seen[name]} on {name!r}: {err}")
             problem.__cause__ = err
-        except _LateError:
+        except LateError:
             problem = InputError(
                 f"{self.path}, message {self.seen[name]} on {name!r} has the time {stamp} "
                 "(nanoseconds), which no clock tells: leave it out (--skip-bad), or record again."
@@ -160,19 +163,19 @@ class _Feed:
         self.bad.append(str(problem))
         return ()
 
-    def _pushed(self, topic: Topic, stamp: int, data: bytes) -> tuple[Row, ...]:
+    def pushed(self, topic: Topic, stamp: int, data: bytes) -> tuple[Row, ...]:
         """The rows that a message completes.
 
         Raises:
             BadMessageError: The builder refuses it.
-            _UndecodableError: It cannot be decoded.
-            _LateError: Its stamp is too large.
-            _TooLargeError: It could unpack to too much.
+            UndecodableError: It cannot be decoded.
+            LateError: Its stamp is too large.
+            TooLargeError: It could unpack to too much.
         """
         name, kind = topic
-        if stamp >= _LATEST:
-            raise _LateError
-        data = _unpacked(data)
+        if stamp >= LATEST:
+            raise LateError
+        data = unpacked(data)
         if kind == ACTION_TYPE:
             message = cast(_String, _decoded(data, ACTION_TYPE))
             return self.builder.act(stamp, name, message.data)
@@ -180,6 +183,7 @@ class _Feed:
         return self.builder.observe(stamp, name, values, labels)
 
     def account(self, stated: int, demonstration: Demonstration) -> Account:
+        """Where the messages went, of which the bag states so many."""
         left_out = {
             "came before the first state": self.early,
             "came after missing messages, before the next state": self.stale,
@@ -194,6 +198,7 @@ class _Feed:
         )
 
     def notes(self) -> tuple[str, ...]:
+        """What was left out; no full stops."""
         notes = []
         if self.early:
             notes.append(
@@ -213,6 +218,7 @@ class _Feed:
         return tuple(notes)
 
     def why_no_rows(self, states: Sequence[str], actions: Sequence[str]) -> str:
+        """Why there are no rows, and what helps."""
         for topic in (*states, *actions):
             if not self.seen[topic]:
                 return f"there is no message on {topic!r}; record it together with the others"
@@ -225,15 +231,15 @@ def _counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-class _UndecodableError(Exception):
+class UndecodableError(Exception):
     """The bytes of a message are not one of its type."""
 
 
-class _TooLargeError(Exception):
+class TooLargeError(Exception):
     """A message could unpack to too much."""
 
 
-class _LateError(Exception):
+class LateError(Exception):
     """The stamp of a message is later than any clock tells."""
 
 
@@ -248,13 +254,13 @@ def _decoded(data: bytes, kind: str) -> object:
     """A message.
 
     Raises:
-        _UndecodableError: It cannot be decoded.
+        UndecodableError: It cannot be decoded.
     """
     try:
         return _TYPES.deserialize_cdr(data, kind)
     except Exception as err:
         # The generated decoders let whatever goes wrong inside them through.
-        raise _UndecodableError(str(err)) from err
+        raise UndecodableError(str(err)) from err
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,7 +286,7 @@ class _States:
         """The numbers of a message, and the names that it gives to them.
 
         Raises:
-            _UndecodableError: It cannot be decoded.
+            UndecodableError: It cannot be decoded.
         """
         head = self._heads.get(len(data))
         if head is not None and data.startswith(head.data):
@@ -298,27 +304,27 @@ class _States:
             self._heads[len(data)] = _Head(head, numbers, labels)
 
 
-def _unpacked(data: bytes) -> bytes:
+def unpacked(data: bytes) -> bytes:
     """A message without the compression of single messages; no message begins like that.
 
     Raises:
-        _TooLargeError: It could unpack to too much.
-        _UndecodableError: It cannot be unpacked.
+        TooLargeError: It could unpack to too much.
+        UndecodableError: It cannot be unpacked.
     """
     if not data.startswith(ZSTD_MAGIC):
         return data
     try:
         check_expansion("it", expansion(data), len(data))
     except InputError as err:
-        raise _TooLargeError(str(err)) from err
+        raise TooLargeError(str(err)) from err
     try:
         return unzstd(data)
     except Exception as err:
-        raise _UndecodableError(str(err)) from err
+        raise UndecodableError(str(err)) from err
 
 
 @contextmanager
-def _with_notes(bag: BagFiles) -> Iterator[None]:
+def with_notes(bag: BagFiles) -> Iterator[None]:
     """Adds to a refusal what is wrong with the files, which may be its reason."""
     try:
         yield
@@ -329,12 +335,13 @@ def _with_notes(bag: BagFiles) -> Iterator[None]:
         raise InputError(f"{str(err).rstrip('.')} ({told}).") from err
 
 
-def _messages(path: Path, bag: BagFiles, wanted: set[Topic]) -> Iterator[tuple[Topic, int, bytes]]:
+def messages_of(path: Path, bag: BagFiles, wanted: set[Topic]) -> Iterator[Message]:
+    """The messages of some topics; whatever damage there is raises `InputError`."""
     with explained(path):
         yield from bag.messages(wanted)
 
 
-def _differences(bag: BagFiles, wanted: set[Topic]) -> Iterator[str]:
+def differences(bag: BagFiles, wanted: set[Topic]) -> Iterator[str]:
     """Notes of what the account, which is about all topics together, does not tell."""
     for name in sorted({name for name, _ in wanted}):
         if count := bag.others_found[name]:
@@ -353,7 +360,7 @@ def _differences(bag: BagFiles, wanted: set[Topic]) -> Iterator[str]:
                 )
 
 
-def _topics(bag: BagFiles) -> dict[str, dict[str, int]]:
+def kinds_of(bag: BagFiles) -> dict[str, dict[str, int]]:
     """Messages of each topic that has some, by their type, or by their encoding."""
     kinds: dict[str, dict[str, int]] = {}
     for (name, kind), count in sorted(bag.found.items()):

@@ -10,6 +10,7 @@ from pathlib import Path
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.errors import InputError, OptionError
+from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
@@ -17,6 +18,7 @@ from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.csv_table import read_csv
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording import RECORDED, is_recording, read_recording, recordings
+from rebt_ros.storage.robot_bag import read_robot_bag
 from rebt_ros.storage.text import unreadable
 
 
@@ -43,6 +45,8 @@ class InputOptions:
     """Of bags, rows per second and channel while an action holds; None for a row per action."""
     skip_bad: bool = False
     """Of bags: whether messages that cannot be used are left out, instead of the bag refused."""
+    robot: RobotFile | None = None
+    """Of bags, where features and actions are in messages of any type, instead of topics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,8 @@ class Loaded:
     """What a person should know, each led by the name of its demonstration."""
     accounts: Mapping[str, Account] = field(default_factory=dict)
     """Where what each demonstration's file holds went."""
+    robot: RobotFile | None = None
+    """Where features and actions are in messages, as the first file has it that says so."""
 
 
 #: Suffixes of tables in a directory, in lower case.
@@ -103,6 +109,7 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
             for note in (*read.notes, *(read.account.notes() if read.account else ()))
         ),
         {read.demonstration.name: read.account for read in reads if read.account},
+        next((read.robot for read in reads if read.robot is not None), None),
     )
 
 
@@ -126,6 +133,15 @@ def _with_common_features(reads: Sequence[Read]) -> list[Read]:
         note = f"no feature in every table, and so left out: {dropped}"
         common.append(replace(read, demonstration=fewer, notes=(*read.notes, note)))
     return common
+
+
+def holds_bags(inputs: Sequence[Path]) -> bool:
+    """Whether one of the inputs is a bag.
+
+    Raises:
+        InputError: One cannot be read.
+    """
+    return any(kind is InputKind.BAG for path in inputs for _, kind in _readable_sources(path))
 
 
 def _readable_sources(path: Path) -> tuple[tuple[Path, InputKind], ...]:
@@ -199,12 +215,18 @@ def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
         (bool(options.action_topics), "an action topic", InputKind.BAG),
         (options.sample_rate is not None, "a sample rate", InputKind.BAG),
         (options.skip_bad, "skipping of bad messages", InputKind.BAG),
+        (options.robot is not None, "a robot file", InputKind.BAG),
     )
     for is_given, what, kind in given:
         if is_given and kind not in kinds:
             raise OptionError(
                 f"the options name {what}, but no input is a {kind.value}: leave that out."
             )
+    if options.robot is not None and (options.state_topics or options.action_topics):
+        raise OptionError(
+            "the options name a robot file, which says what the topics are, and topics beside it: "
+            "leave those out."
+        )
 
 
 def _table(path: Path, options: InputOptions) -> Read:
@@ -223,6 +245,10 @@ def _recording(path: Path, _: InputOptions) -> Read:
 
 
 def _bag(path: Path, options: InputOptions) -> Read:
+    if options.robot is not None:
+        return read_robot_bag(
+            path, options.robot, sample_rate=options.sample_rate, skip_bad=options.skip_bad
+        )
     return read_bag(
         path,
         state_topics=options.state_topics,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.account import Account
 
 
@@ -19,3 +20,5 @@ class Read:
     """Where what it holds went."""
     no_features: frozenset[str] = frozenset()
     """Columns that hold no feature, which those of other files that are called so may well do."""
+    robot: RobotFile | None = None
+    """Where its features and actions are in messages; None where it does not say."""

@@ -1,0 +1,241 @@
+"""Making labels of the messages of a source of actions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, Protocol
+
+from rebt_ros.message_path.checking import check
+from rebt_ros.message_path.compiling import Value, getter
+from rebt_ros.message_path.definition import Definitions, Primitive
+from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.robot_file.robot_file import (
+    ActionSource,
+    AxisLabels,
+    BehaviorTreeLogActions,
+    Emit,
+    JoyActions,
+    PathActions,
+    TwistActions,
+)
+
+_JOY: Final = "sensor_msgs/msg/Joy"
+_TWIST: Final = "geometry_msgs/msg/Twist"
+_STAMPED: Final = "geometry_msgs/msg/TwistStamped"
+_LOG: Final = "nav2_msgs/msg/BehaviorTreeLog"
+
+
+class Labeller(Protocol):
+    """Makes labels of messages that come one after the other."""
+
+    def labels(self, message: Any, stamp: int) -> Sequence[str]:
+        """What a message says that is done from now on; empty labels for nothing any longer.
+
+        Args:
+            message: The message.
+            stamp: When it is from, nanoseconds.
+        """
+
+
+def labeller(source: ActionSource, kind: str, definitions: Definitions) -> Labeller:
+    """What makes labels of a source's messages.
+
+    Raises:
+        MessagePathError: Its messages are of a type that it cannot be made of.
+    """
+    match source:
+        case PathActions():
+            return PathLabeller(source, kind, definitions)
+        case JoyActions():
+            _check_kind(source.topic, kind, _JOY)
+            return JoyLabeller(source)
+        case TwistActions():
+            _check_kind(source.topic, kind, _TWIST, _STAMPED)
+            return TwistLabeller(source, stamped=kind == _STAMPED)
+        case BehaviorTreeLogActions():
+            _check_kind(source.topic, kind, _LOG)
+            return LogLabeller(source)
+
+
+def _check_kind(topic: str, kind: str, *wanted: str) -> None:
+    if kind not in wanted:
+        raise MessagePathError(f"topic {topic!r} must carry {' or '.join(wanted)}, not {kind}.")
+
+
+class _Changes:
+    """Passes labels on that differ from the one before."""
+
+    def __init__(self, emit: Emit) -> None:
+        self._always = emit is Emit.MESSAGE
+        self._last = ""
+
+    def of(self, label: str) -> Sequence[str]:
+        if label == self._last and (not self._always or not label):
+            return ()
+        self._last = label
+        return (label,)
+
+
+class PathLabeller:
+    """Labels from a string, an integer or a truth value.
+
+    Args:
+        source: What is wanted.
+        kind: Name of the type of the messages.
+        definitions: Knows that type.
+
+    Raises:
+        MessagePathError: There is no such value in the messages.
+    """
+
+    def __init__(self, source: PathActions, kind: str, definitions: Definitions) -> None:
+        path = check(source.path, kind, definitions)
+        if path.kind is Primitive.NUMBER:
+            raise MessagePathError(
+                f"message path {str(source.path)!r} gives a number with decimals, of which no "
+                "label can be made: choose a string, an integer or a bool."
+            )
+        self._get = getter(path)
+        self._labels = source.labels
+        self._text = _written(path.kind, path.names)
+        self._changes = _Changes(source.emit)
+
+    def labels(self, message: Any, stamp: int) -> Sequence[str]:
+        """See `Labeller`."""
+        value = self._get(message, stamp)
+        text, name = ("", "") if value is None else self._text(value)
+        if not self._labels:
+            return self._changes.of(name)
+        return self._changes.of(self._labels.get(text, self._labels.get(name, "")))
+
+
+def _written(kind: Primitive, names: Mapping[int, str]) -> Callable[[Value], tuple[str, str]]:
+    """A value as it stands in a robot file, and its name."""
+
+    def written(value: Value) -> tuple[str, str]:
+        if isinstance(value, str) or value is None:
+            return value or "", value or ""
+        if kind is Primitive.TRUTH:
+            text = "true" if value else "false"
+            return text, text
+        text = str(int(value))
+        return text, names.get(int(value), text)
+
+    return written
+
+
+class JoyLabeller:
+    """Labels from the buttons and axes of a joystick.
+
+    Args:
+        source: What is wanted.
+    """
+
+    def __init__(self, source: JoyActions) -> None:
+        self._source = source
+        self._down: set[int] = set()
+        self._held = ""
+
+    def labels(self, message: Any, stamp: int) -> Sequence[str]:
+        """See `Labeller`."""
+        source, buttons = self._source, message.buttons
+        down = {one for one in {*source.press, *source.hold} if one < len(buttons) and buttons[one]}
+        pressed = [source.press[one] for one in source.press if one in down - self._down]
+        self._down = down
+        held = next((label for one, label in source.hold.items() if one in down), "")
+        held = held or self._axis(message.axes)
+        changed = [held] if held != self._held else []
+        self._held = held
+        # What is pressed lasts until something else is done.
+        return [*changed, *pressed]
+
+    def _axis(self, values: Sequence[float]) -> str:
+        for place, labels in self._source.axes.items():
+            if place < len(values):
+                found = _axis_label(labels, values[place], self._held, self._source.hysteresis)
+                if found:
+                    return found
+        return ""
+
+
+def _axis_label(labels: AxisLabels, value: float, held: str, hysteresis: float) -> str:
+    if labels.above is not None:
+        threshold, label = labels.above
+        if value >= threshold - hysteresis * (held == label):
+            return label
+    if labels.below is not None:
+        threshold, label = labels.below
+        if value <= threshold + hysteresis * (held == label):
+            return label
+    return ""
+
+
+class TwistLabeller:
+    """Labels from the direction of a velocity.
+
+    Args:
+        source: What is wanted.
+        stamped: Whether messages are of type TwistStamped.
+    """
+
+    def __init__(self, source: TwistActions, *, stamped: bool) -> None:
+        self._source = source
+        self._stamped = stamped
+        self._now = ""
+        self._changes = _Changes(source.emit)
+
+    def labels(self, message: Any, stamp: int) -> Sequence[str]:
+        """See `Labeller`."""
+        twist = message.twist if self._stamped else message
+        x, z = twist.linear.x / self._source.linear, twist.angular.z / self._source.angular
+        if math.isfinite(x) and math.isfinite(z):
+            self._now = self._label(math.hypot(x, z), math.degrees(math.atan2(z, x)))
+        return self._changes.of(self._now)
+
+    def _label(self, speed: float, direction: float) -> str:
+        source = self._source
+        moving = bool(self._now) and self._now != source.rest
+        # Where it moves, the dead band is smaller, and where it rests, larger.
+        margin = source.hysteresis / 100 * (-1 if moving else 1)
+        if speed <= source.dead_band * (1 + margin):
+            return source.rest
+        off = {label: _between(direction, its) for label, its in source.sectors.items()}
+        nearest = min(off, key=off.__getitem__)
+        stays = moving and self._now in off
+        if stays and off[self._now] - off[nearest] <= 2 * source.hysteresis:
+            return self._now
+        return nearest
+
+
+def _between(first: float, second: float) -> float:
+    """The angle between two directions (degrees)."""
+    return abs((first - second + 180) % 360 - 180)
+
+
+class LogLabeller:
+    """The label of the node that runs, among those that are actions.
+
+    Of several, it is that of the one that has begun last.
+
+    Args:
+        source: What is wanted.
+    """
+
+    def __init__(self, source: BehaviorTreeLogActions) -> None:
+        self._labels = source.labels
+        self._running: dict[str, str] = {}
+        self._changes = _Changes(Emit.CHANGE)
+
+    def labels(self, message: Any, stamp: int) -> Sequence[str]:
+        """See `Labeller`."""
+        said: list[str] = []
+        for event in message.event_log:
+            label = self._labels.get(event.node_name)
+            if label is None:
+                continue
+            self._running.pop(event.node_name, None)
+            if event.current_status == "RUNNING":
+                self._running[event.node_name] = label
+        said += self._changes.of(next(reversed(self._running.values()), ""))
+        return said

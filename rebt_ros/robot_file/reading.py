@@ -1,0 +1,284 @@
+"""Reading robot files, from their text or from what recordings and trees carry of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Final
+
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.message_path.parsing import parse
+from rebt_ros.message_path.path import MessagePath
+from rebt_ros.robot_file.errors import RobotFileError
+from rebt_ros.robot_file.place import Json, Place
+from rebt_ros.robot_file.robot_file import (
+    ActionSource,
+    AxisLabels,
+    BehaviorTreeLogActions,
+    Emit,
+    JoyActions,
+    PathActions,
+    RobotFile,
+    Stamp,
+    StateFeature,
+    TopicSettings,
+    TwistActions,
+)
+from rebt_ros.robot_file.text import LARGEST, read_yaml
+
+#: Most features, and most of anything else that is listed.
+MOST: Final = 1000
+
+#: Sectors of a Twist where none are named (degrees).
+_SECTORS: Final[Mapping[str, float]] = {"forward": 0.0, "left": 90.0, "back": 180.0, "right": -90.0}
+_LARGEST_AGE: Final = 3600.0
+_MOST_BUTTONS: Final = 1000
+
+
+def json_schema() -> Json:
+    """The JSON Schema (draft 2020-12) of robot files."""
+    source = resources.files(__package__).joinpath("robot_file.schema.json")
+    return json.loads(source.read_text(encoding="utf-8"))
+
+
+def read_robot_file(path: Path) -> RobotFile:
+    """Reads a robot file.
+
+    Raises:
+        RobotFileError: It cannot be read, or one sentence says what is wrong in which line.
+    """
+    try:
+        with path.open(encoding="utf-8") as file:
+            text = file.read(LARGEST + 1)
+    except OSError as err:
+        raise RobotFileError(
+            f"the robot file {path} cannot be read ({err.strerror or err}): name a file that can."
+        ) from err
+    except UnicodeDecodeError as err:
+        raise RobotFileError(f"{path} is no text in UTF-8: save it as such.") from err
+    return parse_robot_file(text, str(path))
+
+
+def parse_robot_file(text: str, name: str = "the robot file") -> RobotFile:
+    """The robot file of a text.
+
+    Raises:
+        RobotFileError: One sentence says what is wrong in which line.
+    """
+    content, lines = read_yaml(text, name)
+    return _robot_file(Place(content, name, lines), name, content)
+
+
+def robot_file_of(content: Json, name: str) -> RobotFile:
+    """The robot file that a recording or a tree carries.
+
+    Args:
+        content: `RobotFile.content`.
+        name: What carries it, for messages.
+
+    Raises:
+        RobotFileError: It is none.
+    """
+    return _robot_file(Place(content, name, {}), name, content)
+
+
+def _robot_file(place: Place, name: str, content: Json) -> RobotFile:
+    if place.value is None:
+        place.refuse("is empty: it needs a part 'state'")
+    fields = place.fields("topics", "state", "actions")
+    if "state" not in fields:
+        place.refuse("needs a part 'state' that names the features")
+    state = tuple(_feature(key, its) for key, its in _listed(fields["state"]))
+    if not state:
+        fields["state"].refuse("names no feature")
+    actions = (
+        {key: _source(its) for key, its in _listed(fields["actions"])}
+        if "actions" in fields
+        else {}
+    )
+    topics = (
+        {key: _topic(its) for key, its in _listed(fields["topics"])} if "topics" in fields else {}
+    )
+    robot = RobotFile(name, state, actions, topics, content)
+    used = {*robot.state_topics, *robot.action_topics}
+    for key, its in _listed(fields["topics"]) if "topics" in fields else ():
+        if key not in used:
+            its.refuse("is a topic that neither state nor actions use")
+    return robot
+
+
+def _listed(place: Place) -> list[tuple[str, Place]]:
+    found = list(place.items())
+    if len(found) > MOST:
+        place.refuse(f"has {len(found)} entries: at most {MOST} are read")
+    for key, its in found:
+        if not key or not key.isprintable():
+            its.refuse("has a name that cannot be printed")
+    return found
+
+
+def _topic(place: Place) -> TopicSettings:
+    if isinstance(place.value, str):
+        return TopicSettings(place.text())
+    fields = place.fields("type", "stamp")
+    return TopicSettings(
+        fields["type"].text() if "type" in fields else "",
+        fields["stamp"].one_of(Stamp) if "stamp" in fields else Stamp.RECEIVED,
+    )
+
+
+def _feature(name: str, place: Place) -> StateFeature:
+    if isinstance(place.value, str):
+        return StateFeature(name, _path(place))
+    fields = place.fields("path", "kind", "categories", "max_age")
+    if "path" not in fields:
+        place.refuse("needs a 'path'")
+    kind = fields["kind"].one_of(FeatureKind) if "kind" in fields else None
+    categories = _categories(fields["categories"]) if "categories" in fields else {}
+    if categories and kind not in (None, FeatureKind.CATEGORICAL):
+        fields["categories"].refuse(
+            f"are those of a categorical feature, and its kind is {kind.value}" if kind else ""
+        )
+    age = fields["max_age"].number(1e-3, _LARGEST_AGE) if "max_age" in fields else None
+    return StateFeature(name, _path(fields["path"]), kind, categories, age)
+
+
+def _categories(place: Place) -> dict[str, str]:
+    """Names by value; of a list, each value is its own name."""
+    if isinstance(place.value, list):
+        texts = [one.text() for one in place.elements()]
+        if len(set(texts)) < len(texts):
+            place.refuse("name a category twice")
+        found = dict(zip(texts, texts, strict=True))
+    else:
+        found = {key: its.text() for key, its in _listed(place)}
+    if not found:
+        place.refuse("name no category")
+    return found
+
+
+def _path(place: Place) -> MessagePath:
+    try:
+        return parse(place.text())
+    except MessagePathError as err:
+        place.refuse(f"is wrong, as {str(err).rstrip('.')}")
+
+
+def _source(place: Place) -> ActionSource:
+    if isinstance(place.value, str):
+        return PathActions(_path(place))
+    kinds = [key for key, _ in place.items() if key in _SOURCES]
+    if len(kinds) != 1:
+        place.refuse(f"needs one of {', '.join(_SOURCES)}, which says what kind of source it is")
+    return _SOURCES[kinds[0]](place)
+
+
+def _path_actions(place: Place) -> ActionSource:
+    fields = place.fields("path", "labels", "emit")
+    return PathActions(_path(fields["path"]), _labels(fields, "labels"), _emit(fields))
+
+
+def _joy_actions(place: Place) -> ActionSource:
+    fields = place.fields("joy", "press", "hold", "axes", "hysteresis")
+    press, hold = (
+        {_button(its, key): label for key, (its, label) in _places(fields, name).items()}
+        for name in ("press", "hold")
+    )
+    axes = (
+        {_button(its, key): _axis(its) for key, its in _listed(fields["axes"])}
+        if "axes" in fields
+        else {}
+    )
+    if not (press or hold or axes):
+        place.refuse("needs 'press', 'hold' or 'axes'")
+    hysteresis = fields["hysteresis"].number(0, 1) if "hysteresis" in fields else 0.1
+    return JoyActions(fields["joy"].text(), press, hold, axes, hysteresis)
+
+
+def _places(fields: Mapping[str, Place], name: str) -> dict[str, tuple[Place, str]]:
+    if name not in fields:
+        return {}
+    return {key: (its, its.text()) for key, its in _listed(fields[name])}
+
+
+def _button(place: Place, key: str) -> int:
+    if not (key.isascii() and key.isdecimal()) or int(key) >= _MOST_BUTTONS:
+        place.refuse("must be named by its number, from 0 on")
+    return int(key)
+
+
+def _axis(place: Place) -> AxisLabels:
+    """Labels by threshold: positive ones are reached from below, negative ones from above."""
+    above = below = None
+    for key, its in _listed(place):
+        try:
+            threshold = float(key)
+        except ValueError:
+            its.refuse("must be a threshold between -1 and 1, such as 0.5 or -0.5")
+        if not 0 < abs(threshold) <= 1:
+            its.refuse("must be a threshold between -1 and 1, and not 0")
+        if threshold > 0 and above is None:
+            above = (threshold, its.text())
+        elif threshold < 0 and below is None:
+            below = (threshold, its.text())
+        else:
+            its.refuse("is a second threshold on the same side")
+    if above is None and below is None:
+        place.refuse("needs a threshold, such as 0.5")
+    return AxisLabels(above, below)
+
+
+def _twist_actions(place: Place) -> ActionSource:
+    fields = place.fields(
+        "twist", "sectors", "rest", "dead_band", "linear", "angular", "hysteresis", "emit"
+    )
+    sectors = dict(_SECTORS)
+    if "sectors" in fields:
+        sectors = {key: its.number(-360, 360) for key, its in _listed(fields["sectors"])}
+    if not sectors:
+        fields["sectors"].refuse("name no sector")
+
+    def number(name: str, default: float, least: float, most: float) -> float:
+        return fields[name].number(least, most) if name in fields else default
+
+    rest = "stop"
+    if "rest" in fields:
+        rest = fields["rest"].text() if fields["rest"].value not in ("", None) else ""
+    return TwistActions(
+        fields["twist"].text(),
+        sectors,
+        rest,
+        number("dead_band", 0.05, 0, 1e6),
+        number("linear", 1.0, 1e-6, 1e6),
+        number("angular", 1.0, 1e-6, 1e6),
+        number("hysteresis", 10.0, 0, 90),
+        _emit(fields),
+    )
+
+
+def _log_actions(place: Place) -> ActionSource:
+    fields = place.fields("behavior_tree_log", "labels")
+    labels = _labels(fields, "labels")
+    if not labels:
+        place.refuse("needs 'labels', the nodes that are actions with the label of each")
+    return BehaviorTreeLogActions(fields["behavior_tree_log"].text(), labels)
+
+
+def _labels(fields: Mapping[str, Place], name: str) -> dict[str, str]:
+    return {key: label for key, (_, label) in _places(fields, name).items()}
+
+
+def _emit(fields: Mapping[str, Place]) -> Emit:
+    return fields["emit"].one_of(Emit) if "emit" in fields else Emit.MESSAGE
+
+
+#: What a source is by the key that names its topic.
+_SOURCES: Final[Mapping[str, Callable[[Place], ActionSource]]] = {
+    "path": _path_actions,
+    "joy": _joy_actions,
+    "twist": _twist_actions,
+    "behavior_tree_log": _log_actions,
+}

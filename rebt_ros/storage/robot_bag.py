@@ -1,0 +1,187 @@
+"""rosbag2 recordings of a robot's own messages, read by its robot file."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import chain
+from pathlib import Path
+from textwrap import shorten
+from typing import Final
+
+from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
+from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
+from rebt_ros.errors import InputError
+from rebt_ros.robot_file.binding import BoundTopic, bind
+from rebt_ros.robot_file.features import Categories, FeatureReader, described
+from rebt_ros.robot_file.robot_file import RobotFile
+from rebt_ros.storage.bag import (
+    LATEST,
+    Feed,
+    LateError,
+    UndecodableError,
+    differences,
+    kinds_of,
+    messages_of,
+    unpacked,
+    with_notes,
+)
+from rebt_ros.storage.bag_files import BagFiles, Message, Topic, opened_bag
+from rebt_ros.storage.message_types import BagTypes
+from rebt_ros.storage.read import Read
+
+#: The stamp of a header, behind the four bytes that messages begin with.
+_STAMPS: Final = {b"\0\1": struct.Struct("<iI"), b"\0\0": struct.Struct(">iI")}
+_HEAD: Final = 4
+#: Longest list of topics in a sentence (characters).
+_LONGEST_LIST: Final = 500
+
+
+def read_robot_bag(
+    path: Path,
+    robot: RobotFile,
+    *,
+    sample_rate: float | None = None,
+    skip_bad: bool = False,
+) -> Read:
+    """Reads a bag by a robot file.
+
+    Args:
+        path: A bag's directory, or a single .mcap or .db3 file, packed with zstd or not.
+        robot: Where features and actions are.
+        sample_rate: Rows per second and channel while an action holds; None: one row per action.
+        skip_bad: Leave out messages that cannot be used, and note how many, instead of refusing
+            the bag.  Actions before the first state are always left out.
+
+    Returns:
+        The rows that the recorder would have made of these messages.
+
+    Raises:
+        InputError: The bag cannot be read, lacks topics or holds unusable messages.
+        RobotFileError: The robot file does not fit the bag.
+        OptionError: The sample rate makes no sense.
+    """
+    if not robot.actions:
+        raise InputError(f"{robot.name} has no part 'actions', so that a bag shows no actions.")
+    with opened_bag(path) as bag:
+        types = BagTypes()
+        with with_notes(bag):
+            kinds = kinds_of(bag)
+            if not kinds:
+                raise InputError(f"{path} holds no messages: record the robot's topics first.")
+            wanted = {
+                topic: bind(robot, name, topic[1], types)
+                for topic, name in _chosen(path, kinds, robot).items()
+            }
+        states = [one for one in wanted.values() if one.features]
+        categories: dict[str, Categories] = {}
+        readers = {one.name: FeatureReader(one, categories) for one in states}
+        builder = DemonstrationBuilder(
+            [StateTopic(name, reader.names, may_miss=True) for name, reader in readers.items()],
+            list(robot.actions),
+            sample_rate,
+        )
+        there = {topic[0]: bag.found[topic] for topic, one in wanted.items() if one.features}
+        feed = _RobotFeed(
+            path, builder, skip_bad, there, types=types, topics=wanted, readers=readers
+        )
+        messages = _in_order(path, bag, wanted)
+        rows = (row for message in messages for row in feed.rows_of(*message))
+        first = next(rows, None)
+        if first is None or builder.features is None:
+            with with_notes(bag):
+                why = feed.why_no_rows([name for name, _ in wanted], ())
+                raise InputError(f"{path} gives no rows: {why}.")
+        shown = Demonstration.from_rows(
+            path.absolute().name,
+            builder.features,
+            chain((first,), rows),
+            RowKind.EVENT if sample_rate is None else RowKind.SAMPLE,
+        )
+        shown = replace(shown, features=described(shown.features, states, categories))
+        stated = sum(bag.stated.get(topic, bag.found[topic]) for topic in wanted)
+        notes = (*bag.notes, *differences(bag, set(wanted)), *feed.notes())
+    return Read(shown, notes, feed.account(stated, shown), robot=robot)
+
+
+@dataclass(slots=True, kw_only=True)
+class _RobotFeed(Feed):
+    """Reads messages of any type."""
+
+    types: BagTypes
+    topics: dict[Topic, BoundTopic]
+    readers: dict[str, FeatureReader] = field(default_factory=dict)
+
+    def pushed(self, topic: Topic, stamp: int, data: bytes) -> tuple[Row, ...]:
+        """The rows that a message completes; see `Feed.pushed`."""
+        if stamp >= LATEST:
+            raise LateError
+        bound, data = self.topics[topic], unpacked(data)
+        try:
+            message = self.types.decode(data, bound.kind)
+        except Exception as err:  # whatever the generated decoders meet
+            raise UndecodableError(str(err)) from err
+        rows: list[Row] = []
+        # What is done follows from what was there before this message.
+        for channel, labeller in bound.labellers.items():
+            for label in labeller.labels(message, stamp):
+                rows += self.builder.act(stamp, channel, label)
+        reader = self.readers.get(bound.name)
+        if reader is not None:
+            rows += self.builder.observe(stamp, bound.name, reader.read(message, stamp))
+        return tuple(rows)
+
+
+def _chosen(
+    path: Path, kinds: Mapping[str, Mapping[str, int]], robot: RobotFile
+) -> dict[Topic, str]:
+    """The topics that the robot file names, as the bag has them, by what it calls them.
+
+    Raises:
+        InputError: The bag has no messages on one of them, or messages of several types.
+    """
+    there = shorten(
+        ", ".join(f"{topic} ({', '.join(its)})" for topic, its in kinds.items()),
+        _LONGEST_LIST,
+        placeholder=" ...",
+    )
+    by_name = {topic.lstrip("/"): topic for topic in kinds} | {topic: topic for topic in kinds}
+    chosen: dict[Topic, str] = {}
+    for name in dict.fromkeys((*robot.state_topics, *robot.action_topics)):
+        topic = by_name.get(name) or by_name.get(name.lstrip("/"))
+        if topic is None:
+            raise InputError(
+                f"{path} has no messages on {name!r}, which {robot.name} names: there is {there}."
+            )
+        declared = robot.settings_of(name).kind
+        if len(kinds[topic]) > 1 and declared not in kinds[topic]:
+            raise InputError(
+                f"{path} has messages of several types on {name!r} ({', '.join(kinds[topic])}): "
+                f"say in {robot.name} which of them is meant, under 'topics'."
+            )
+        kind = declared if declared in kinds[topic] else next(iter(kinds[topic]))
+        chosen[topic, kind] = name
+    return chosen
+
+
+def _in_order(path: Path, bag: BagFiles, wanted: dict[Topic, BoundTopic]) -> Iterator[Message]:
+    """The messages by when they are from."""
+    messages = messages_of(path, bag, set(wanted))
+    headed = {topic for topic, one in wanted.items() if one.has_stamp}
+    if not headed:
+        return messages
+    stamped = (
+        (topic, _stamp_of(data, stamp) if topic in headed else stamp, data)
+        for topic, stamp, data in messages
+    )
+    return iter(sorted(stamped, key=lambda message: message[1]))
+
+
+def _stamp_of(data: bytes, otherwise: int) -> int:
+    """The stamp in the header of a message (nanoseconds), where it has one."""
+    numbers = _STAMPS.get(data[:2])
+    if numbers is None or len(data) < _HEAD + numbers.size:
+        return otherwise
+    seconds, nanoseconds = numbers.unpack_from(data, _HEAD)
+    return int(seconds) * 1_000_000_000 + int(nanoseconds)
