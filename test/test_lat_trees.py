@@ -456,3 +456,13 @@ def test_the_trees_do_not_depend_on_the_order_of_sets() -> None:
     }
     assert len(printed) == 1
     assert "CycleNode" in printed.pop()
+
+
+def test_a_loop_that_is_a_tree_already_is_not_offered_twice() -> None:
+    rules = followers({"a": "bc", "b": "a", "c": "a"})
+    occurrences = Occurrences((tuple("abababacaca"),))
+    trees = gen_lat_trees(rules, occurrences).trees
+    loops_alone = loop_trees(rules, trees, occurrences, most=9).trees
+    assert loops_alone
+    again = loop_trees(rules, (*trees, *loops_alone), occurrences, most=9)
+    assert not {one.path for one in again.trees} & {one.path for one in loops_alone}

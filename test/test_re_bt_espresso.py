@@ -159,3 +159,17 @@ def test_algorithm_1_returns_the_main_tree_and_the_lat_trees_beside_it() -> None
         for one in found.lat.trees
     ] == [("ab", 2)]
     assert nodes.actions(found.lat.trees[0].subtree) == (A, B)
+
+
+def test_an_action_of_a_single_row_is_triggered_and_one_of_none_is_not() -> None:
+    assert delta_close(Leaf((0, 1, 0)), 0.3) == (1,)
+    assert delta_close(Leaf((0, 1, 1)), 0.0) == (1, 2)
+    assert delta_close(Leaf((0, 1, 1)), 1.0) == (1, 2)
+
+
+def test_delta_is_that_of_the_paper_unless_it_is_given() -> None:
+    apart = Leaf((69, 100)), Leaf((100, 70))
+    tree = DecisionTree((A, B), Split(IsTrue("x"), *apart))
+    assert re_bt_espresso(tree) == re_bt_espresso(tree, delta=0.3)
+    assert re_bt_espresso(tree) != re_bt_espresso(tree, delta=0.32)
+    assert re_bt_espresso(tree) != re_bt_espresso(tree, delta=0.29)
