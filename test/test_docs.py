@@ -1,0 +1,62 @@
+"""Numbers and lists in the docs are those of the code."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import strategies as some
+
+from rebt_ros.behavior_tree import document
+from rebt_ros.behavior_tree.shown import MOST_SHOWN_LEAVES
+from rebt_ros.beyond_the_paper import reductions
+from rebt_ros.decision_tree import simplest
+from rebt_ros.learning import suggesting
+
+#: And the kind of a feature that has one.
+KINDS_OF_NODES = frozenset({"action", "condition", "inverter", "categorical"})
+_DOCS = Path(__file__).resolve().parents[1] / "docs"
+
+
+def text_of(name: str) -> str:
+    """A page with its lines joined."""
+    return " ".join((_DOCS / name).read_text(encoding="utf-8").split())
+
+
+def test_the_page_on_formats_says_what_the_reader_of_documents_takes() -> None:
+    page = text_of("formats.md")
+    assert f"more than 100 levels or {document.LARGEST_DOCUMENT // 10**6} million char" in page
+    assert f'`"{document.FORMAT}"`, `{document.VERSION}`' in page
+    assert f"at most {MOST_SHOWN_LEAVES} leaves for a channel" in page
+    written = json.loads(document.dumps(some.learned(some.ACTIONS[0])))
+    assert [name for name in written if f"`{name}`" not in page] == []
+
+
+def test_the_page_on_formats_names_each_type_of_condition() -> None:
+    schema = json.dumps(document.json_schema())
+    types = set(
+        re.findall(r'"const": "((?:\w+_)?(?:is|threshold|interval|category|true)\w*)"', schema)
+    )
+    assert {"threshold", "previous_action_is"} <= types
+    page = text_of("formats.md")
+    assert [
+        name for name in sorted(types) if f"`{name}`" not in page and f'"{name}"' not in page
+    ] == []
+
+
+def test_the_page_on_learning_names_the_limits() -> None:
+    page = text_of("learning.md")
+    rows, leaves, each = simplest._MOST_ROWS, simplest._MOST_LEAVES, simplest._LEAST_ROWS_PER_LEAF
+    assert (
+        f"trees of up to {leaves} leaves, with at least {each} rows for each, and at most {rows}"
+        in page
+    )
+    for limit in (
+        reductions.MOST_LEAVES_BY_DOMAIN,
+        reductions.MOST_LEAVES_IN_BEST_ORDER,
+        reductions.MOST_LEAVES_MINIMIZED,
+    ):
+        assert f" {limit} leaves" in page
+    assert suggesting._MOST_SUGGESTIONS == 12
+    assert "at most twelve suggestions" in page
