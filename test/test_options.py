@@ -88,3 +88,37 @@ def test_numbers_of_numpy_and_lists_are_taken() -> None:
     assert options.attach == ("psa-1",)
     units: Mapping[str, str] = MappingProxyType({"x": "m"})
     assert LearnOptions(units=units).units == units
+
+
+@pytest.mark.parametrize(
+    ("name", "inside", "outside"),
+    [
+        ("delta", (0, 1), (-1e-9, 1 + 1e-9)),
+        ("max_depth", (1,), (0,)),
+        ("ccp_alpha", (0,), (-1e-9, math.inf)),
+        ("level", (0,), (-1,)),
+        ("test_fraction", (0,), (-1e-9, 1)),
+        ("reaction_time", (0, 5), (-1e-9, 5 + 1e-9)),
+        ("random_state", (0, 2**32 - 1), (-1, 2**32)),
+        ("lags", (0, 20), (-1, 21)),
+    ],
+)
+def test_ranges_include_their_ends(
+    name: str, inside: tuple[float, ...], outside: tuple[float, ...]
+) -> None:
+    for value in inside:
+        assert getattr(LearnOptions(**{name: value}), name) == value
+    for value in outside:
+        with pytest.raises(OptionError, match=f"^{name} must "):
+            LearnOptions(**{name: value})
+
+
+def test_the_papers_settings_are_those_of_the_paper() -> None:
+    """IV-B, and nothing that goes past it."""
+    assert (PAPER.delta, PAPER.max_depth, PAPER.ccp_alpha) == (0.3, 5, 0.0)
+    assert (PAPER.psa, PAPER.history) == (Use.ALWAYS, rebt_ros.History.LAST)
+    assert (PAPER.root, PAPER.reductions) == (rebt_ros.Root.PARALLEL, None)
+    assert (PAPER.differences, PAPER.reaction_time) == (Use.NEVER, 0.0)
+    assert not any((PAPER.refit, PAPER.simplest, PAPER.readable_thresholds, PAPER.routines))
+    assert PAPER.is_paper
+    assert not LearnOptions().is_paper

@@ -257,6 +257,15 @@ TABLES = [
         id="ParallelSelector",
     ),
     pytest.param(
+        # go   turn   PSA: the first action is asked again while the second runs
+        # F    R      R
+        # S    -      S
+        nodes.ParallelSelector((GO, TURN)),
+        {"go": "FS", "turn": "R"},
+        [("R", "go, turn"), ("S", "go, halt turn")],
+        id="ParallelSelector without memory",
+    ),
+    pytest.param(
         # go   turn   Parallel
         # R    R      R
         # S    R      R   succeeds when all have succeeded
