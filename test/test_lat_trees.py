@@ -466,3 +466,8 @@ def test_a_loop_that_is_a_tree_already_is_not_offered_twice() -> None:
     assert loops_alone
     again = loop_trees(rules, (*trees, *loops_alone), occurrences, most=9)
     assert not {one.path for one in again.trees} & {one.path for one in loops_alone}
+
+
+def test_where_no_loops_are_asked_for_none_are_left_out() -> None:
+    rules = [rule("a", [c(0)]), rule("b", [c(1)])]
+    assert single_loops_of(rules, (tuple("aabb"),), most=0) == LoopTrees((), 0)

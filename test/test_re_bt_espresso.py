@@ -173,3 +173,13 @@ def test_delta_is_that_of_the_paper_unless_it_is_given() -> None:
     assert re_bt_espresso(tree) == re_bt_espresso(tree, delta=0.3)
     assert re_bt_espresso(tree) != re_bt_espresso(tree, delta=0.32)
     assert re_bt_espresso(tree) != re_bt_espresso(tree, delta=0.29)
+
+
+def test_of_a_group_the_best_supported_action_stands_first() -> None:
+    # Over both leaves b has more rows than a, although a is the most probable of one of them.
+    leaves = Leaf((10, 9, 0)), Leaf((8, 10, 0))
+    (found,) = dt_to_rules_psa(DecisionTree((A, B, C), Split(IsTrue("x"), *leaves)), 0.3)
+    assert found.actions == (B, A)
+    equal = Leaf((10, 8, 0)), Leaf((8, 10, 0))
+    (found,) = dt_to_rules_psa(DecisionTree((A, B, C), Split(IsTrue("x"), *equal)), 0.3)
+    assert found.actions == (A, B)
