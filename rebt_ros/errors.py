@@ -25,7 +25,16 @@ class RebtError(Exception):
         if len(text) > LONGEST_MESSAGE:
             half = (LONGEST_MESSAGE - 1) // 2
             text = f"{text[:half]}…{text[-half:]}"
-        return text if text.isprintable() else "".join(map(_printable, text))
+        return printable(text)
+
+
+def printable(text: str) -> str:
+    r"""The text as a single line that any log and terminal can bear.
+
+    >>> printable("/state\n\x1b[31m")
+    '/state \\x1b[31m'
+    """
+    return text if text.isprintable() else "".join(map(_printable, text))
 
 
 def _printable(character: str) -> str:

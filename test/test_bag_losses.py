@@ -16,6 +16,7 @@ from pathlib import Path
 import lz4.frame
 import mcap_files as mcap
 import pytest
+from benchmarks.large_inputs import many_topics
 from fuzz import corpus
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -245,7 +246,7 @@ def test_statistics_that_do_not_count_by_channel_are_compared_in_total(tmp_path:
     path.write_bytes(data[:begin] + head + bytes(4 + 20) + data[begin + 9 + 46 + 20 :])
     read = read_bag(path)
     assert len(read.demonstration) == 20
-    assert read.notes == ("bag.mcap says that it holds 50 messages, and 40 were found",)
+    assert read.notes == ("the file says that it holds 50 messages, and 40 were found",)
 
 
 @pytest.mark.parametrize("suffix", [".lz4", ".zst", ".zstd"])
@@ -379,3 +380,16 @@ def test_the_pages_of_a_log_that_are_not_complete_are_noted(tmp_path: Path) -> N
     assert any(
         "pages are not complete or damaged: they were not read" in note for note in _read(bag).notes
     )
+
+
+# --- large ones -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("storage", [MCAP, SQLITE])
+def test_a_bag_of_700_topics_with_40_publishers_on_one_is_read(
+    tmp_path: Path, storage: StoragePlugin
+) -> None:
+    loaded = load([many_topics(tmp_path / "bag", storage, seconds=1)])
+    assert loaded.notes == ()
+    assert [len(one) for one in loaded.demonstrations] == [20]
+    assert not [one for one in loaded.accounts.values() if one.missing]

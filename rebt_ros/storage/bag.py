@@ -22,7 +22,7 @@ from rebt_ros.arrays import FloatArray
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, Fault, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.fields import ArrayMessage, names_of, values_of
-from rebt_ros.errors import InputError
+from rebt_ros.errors import InputError, printable
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.bag_files import GAP, BagFiles, Message, Topic, explained, opened_bag
 from rebt_ros.storage.bag_safety import check_expansion, expansion
@@ -31,6 +31,9 @@ from rebt_ros.storage.read import Read
 
 STATE_TYPE = "std_msgs/msg/Float64MultiArray"
 ACTION_TYPE = "std_msgs/msg/String"
+
+#: So many messages can have been recorded at the same time.
+_FEW: Final = 4
 
 #: Longest list of topics in a sentence (characters).
 _LONGEST_LIST: Final = 500
@@ -73,7 +76,11 @@ def read_bag(
             if not kinds:
                 raise InputError(f"{path} holds no messages: record state and action topics first.")
             states = _chosen(path, kinds, names, STATE_TYPE, "state")
-            actions = _chosen(path, kinds, action_topics, ACTION_TYPE, "action")
+            # No topic is both, unless the user says so.
+            others = {name: its for name, its in kinds.items() if name not in states}
+            actions = _chosen(
+                path, kinds if action_topics else others, action_topics, ACTION_TYPE, "action"
+            )
         topics = (
             [replace(one, name=name) for one, name in zip(state_topics, states, strict=True)]
             if state_topics
@@ -95,7 +102,7 @@ def read_bag(
         )
         stated = sum(bag.stated.get(topic, bag.found[topic]) for topic in wanted)
         notes = (*bag.notes, *differences(bag, wanted), *feed.notes())
-    return Read(demonstration, notes, feed.account(stated, demonstration))
+    return Read(demonstration, tuple(map(printable, notes)), feed.account(stated, demonstration))
 
 
 @dataclass(slots=True)
@@ -116,6 +123,10 @@ class Feed:
     """Actions after missing messages and before the next states."""
     unknown: set[str] = field(default_factory=set)
     """State topics whose last message may be missing."""
+    earliest: int = LATEST
+    """Stamp of a message."""
+    latest: int = -LATEST
+    """Stamp of another one."""
     bad: list[str] = field(default_factory=list)
     """What was wrong with the messages that were left out."""
 
@@ -131,6 +142,7 @@ class Feed:
             return ()
         name, kind = topic
         self.seen[name] += 1
+        self.earliest, self.latest = min(stamp, self.earliest), max(stamp, self.latest)
         if name in self.there:
             self.unknown.discard(name)
         elif self.unknown:
@@ -147,7 +159,7 @@ class Feed:
         except UndecodableError as err:
             problem = InputError(
                 f"{self.path}, message {self.seen[name]} on {name!r} cannot be decoded as "
-                f"{kind}: record the topic again."
+                f"{kind}{err}: leave it out (--skip-bad), or record the topic again."
             )
             problem.__cause__ = err
         except TooLargeError as err:
@@ -200,6 +212,8 @@ class Feed:
     def notes(self) -> tuple[str, ...]:
         """What was left out; no full stops."""
         notes = []
+        if self._has_no_times():
+            notes.append(f"{self._no_times()}: they are taken in their order in the file")
         if self.early:
             notes.append(
                 f"left out: {_counted(self.early, 'action')} before the first message of every "
@@ -217,6 +231,15 @@ class Feed:
             )
         return tuple(notes)
 
+    def _has_no_times(self) -> bool:
+        return self.earliest == self.latest and self.seen.total() > _FEW
+
+    def _no_times(self) -> str:
+        return (
+            f"all messages were recorded at the same time ({self.earliest} ns), as under "
+            "use_sim_time without /clock"
+        )
+
     def why_no_rows(self, states: Sequence[str], actions: Sequence[str]) -> str:
         """Why there are no rows, and what helps."""
         for topic in (*states, *actions):
@@ -224,6 +247,8 @@ class Feed:
                 return f"there is no message on {topic!r}; record it together with the others"
         if self.early:
             return "all actions came before the first state; start the state topics first"
+        if self._has_no_times():
+            return f"{self._no_times()}; leave out --sample-rate, or record with a clock"
         return "no action has a label, or none is held until a sample is due; record longer ones"
 
 
@@ -232,7 +257,7 @@ def _counted(count: int, noun: str) -> str:
 
 
 class UndecodableError(Exception):
-    """The bytes of a message are not one of its type."""
+    """The bytes of a message are not one of its type; the text says why, if it is known."""
 
 
 class TooLargeError(Exception):
@@ -249,6 +274,9 @@ class _String(Protocol):
 
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 
+#: How messages of either byte order begin; other encapsulations align numbers otherwise.
+_PLAIN_CDR: Final = (b"\0\0", b"\0\1")
+
 
 def _decoded(data: bytes, kind: str) -> object:
     """A message.
@@ -256,11 +284,15 @@ def _decoded(data: bytes, kind: str) -> object:
     Raises:
         UndecodableError: It cannot be decoded.
     """
+    if data[:2] not in _PLAIN_CDR:
+        raise UndecodableError(
+            f" (it begins with {data[:2].hex()}, and plain CDR with 0000 or 0001)"
+        )
     try:
         return _TYPES.deserialize_cdr(data, kind)
     except Exception as err:
         # The generated decoders let whatever goes wrong inside them through.
-        raise UndecodableError(str(err)) from err
+        raise UndecodableError from err
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,7 +352,7 @@ def unpacked(data: bytes) -> bytes:
     try:
         return unzstd(data)
     except Exception as err:
-        raise UndecodableError(str(err)) from err
+        raise UndecodableError from err
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import re
+import sqlite3
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -30,6 +31,9 @@ from rebt_ros.storage.text import unreadable
 #: Suffixes of files that hold a bag's messages, in lower case.
 STORAGE_SUFFIXES: Final = (".mcap", ".db3")
 
+#: How the names of files begin in which macOS keeps what other file systems cannot hold.
+_APPLE: Final = "._"
+
 _CDR: Final = "cdr"
 _NUMBERED: Final = re.compile(r"(.+)_([0-9]{1,6})\.\w.*")
 #: A recording of a day that is split each minute has 1440 files.
@@ -47,6 +51,8 @@ GAP: Final[Topic] = ("", "")
 
 def holds_messages(path: Path) -> bool:
     """Whether the name is that of a file of a bag's messages, packed or not."""
+    if path.name.startswith(_APPLE):
+        return False
     return without_packing(path.name.lower()).endswith(STORAGE_SUFFIXES)
 
 
@@ -127,7 +133,7 @@ def opened_bag(path: Path) -> Iterator[BagFiles]:
                 _open_all(files, bag, stack)
             else:
                 # SQLite's log is beside the file that a link leads to.
-                _open(path.resolve(), bag, stack)
+                _open(path.resolve(), bag, stack, "the file")
         if metadata is not None:
             # A recorder that was killed has counted nothing.
             bag.stated |= {topic: count for topic, count in metadata.counts.items() if count > 0}
@@ -200,7 +206,7 @@ def _open_all(files: Sequence[Path], bag: BagFiles, stack: ExitStack) -> None:
     failures = 0
     for file in files:
         try:
-            _open(file, bag, stack)
+            _open(file, bag, stack, file.name)
         except Exception as err:
             failures += 1
             if failures == len(files):
@@ -209,20 +215,21 @@ def _open_all(files: Sequence[Path], bag: BagFiles, stack: ExitStack) -> None:
             bag.notes.append(f"{file.name} cannot be read, and is left out: {_reason(err)}")
 
 
-def _open(file: Path, bag: BagFiles, stack: ExitStack) -> None:
+def _open(file: Path, bag: BagFiles, stack: ExitStack, name: str) -> None:
+    """Opens a file, packed or not; notes call it by a name."""
     plain = without_packing(file.name)
     if plain == file.name:
-        _open_plain(file, file.name, bag, stack)
+        _open_plain(file, name, bag, stack)
         return
     directory = stack.enter_context(TemporaryDirectory())
     unpacked = Path(directory, plain)
     if why := unpack_file(file, unpacked):
         size = unpacked.stat().st_size
         bag.notes.append(
-            f"{file.name} is damaged: its first {size} bytes could be unpacked ({_shortened(why)})"
+            f"{name} is damaged: its first {size} bytes could be unpacked ({_shortened(why)})"
         )
     check_bag(unpacked, bag_metadata.NAME)
-    _open_plain(unpacked, file.name, bag, stack)
+    _open_plain(unpacked, name, bag, stack)
 
 
 def _open_plain(file: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
@@ -235,8 +242,8 @@ def _open_plain(file: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
         magic = opened.read(len(sqlite.MAGIC))
     if magic.startswith(MCAP_MAGIC):
         _open_mcap(file, name, bag, stack)
-    elif file.suffix.lower() == ".mcap":
-        raise ValueError(f"{name} does not begin like an mcap file")
+    elif file.suffix.lower() == ".mcap" and magic != sqlite.MAGIC:
+        raise ValueError(f"{file.name} does not begin like an mcap file")
     else:
         _open_sqlite(file, name, bag, stack)
 
@@ -386,6 +393,11 @@ def _explanation(path: Path, err: Exception) -> InputError:
         return InputError(
             f"{path} cannot be read without the package {err.name}, which rosbags brings: "
             "install rosbags with pip."
+        )
+    if isinstance(err, sqlite3.Error) and err.sqlite_errorcode == sqlite3.SQLITE_INTERRUPT:
+        return InputError(
+            f"{path} would have SQLite compute more than ten times as long as a recorded bag of "
+            "its size, and was interrupted: record it again."
         )
     if isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT):
         return InputError(

@@ -20,7 +20,8 @@ LARGEST: Final = 32_000_000
 #: Longest text without QoS that is read as YAML (bytes), which takes a second for each 100,000: 700
 #: topics make 150,000.
 _LARGEST_YAML: Final = 1_000_000
-#: Deepest nesting of brackets; the time that YAML takes grows with its square.
+#: Deepest nesting of brackets, of which recorders write one or two levels (`[]`); the time that
+#: YAML takes grows with its square.
 _DEEPEST: Final = 20
 _ALIAS: Final = re.compile(r"(?:^|[:\-\[,{?])\s*[*&][^\s*&]", re.MULTILINE)
 _QOS: Final = re.compile(r"( *)(?:- )?offered_qos_profiles:(.*)")
@@ -46,13 +47,17 @@ def read_metadata(directory: Path) -> BagMetadata | None:
     file = directory / NAME
     if not file.exists():
         return None
-    if file.stat().st_size > LARGEST:
-        raise InputError(f"{file} has more than {LARGEST} bytes, the most that are read.")
+    size = file.stat().st_size
+    if size > LARGEST:
+        raise InputError(f"{file} has {size} bytes, and at most {LARGEST} are read.")
     text = "\n".join(_without_qos(file.read_text(encoding="utf-8", errors="replace")))
-    if len(text) > _LARGEST_YAML or _ALIAS.search(text) or _nests_deeply(text):
+    if len(text) > _LARGEST_YAML:
         raise InputError(
-            f"{file} has YAML anchors, aliases, deep nesting or more than {_LARGEST_YAML} bytes "
-            "beside QoS, which no recorder writes."
+            f"{file} has {len(text)} characters beside QoS, and at most {_LARGEST_YAML} are read."
+        )
+    if _ALIAS.search(text) or _nests_deeply(text):
+        raise InputError(
+            f"{file} has YAML anchors, aliases or deep nesting, which no recorder writes."
         )
     try:
         return _parsed(text)

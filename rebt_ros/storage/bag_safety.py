@@ -25,8 +25,8 @@ LARGEST_EXPANSION: Final = 64 << 20
 #: The same of a whole file (bytes): a costmap of 1000 x 1000 cells that hardly changes, at 2 Hz for
 #: a minute, is 120 MB that pack to next to nothing.
 LARGEST_FILE: Final = 256 << 20
-#: How many times their own size data may unpack to where that is more: images of a simulated camera
-#: without noise pack to a hundredth.
+#: How many times their own size data may unpack to where that is more: chunks of 700 topics on
+#: which messages hardly change unpack to 78 times their size.
 LARGEST_RATIO: Final = 200
 
 _ZSTD: Final = int.from_bytes(ZSTD_MAGIC, "little")
@@ -105,6 +105,8 @@ def _check_file(file: Path, directory: Path) -> None:
 
 def _check_place(file: Path, directory: Path) -> None:
     """Refuses what is no file, or stands elsewhere."""
+    if not file.exists():
+        raise InputError(f"{file} is a link that leads nowhere: put the file itself in its place.")
     if not stat.S_ISREG(file.stat().st_mode):
         raise InputError(f"{file} is not a file: take it out of the bag.")
     if not file.resolve().is_relative_to(directory.resolve()):

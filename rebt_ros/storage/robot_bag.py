@@ -12,7 +12,7 @@ from typing import Final
 
 from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
-from rebt_ros.errors import InputError
+from rebt_ros.errors import InputError, printable
 from rebt_ros.robot_file.binding import BoundTopic, bind
 from rebt_ros.robot_file.features import Categories, FeatureReader, described
 from rebt_ros.robot_file.robot_file import RobotFile
@@ -102,7 +102,7 @@ def read_robot_bag(
         shown = replace(shown, features=described(shown.features, states, categories))
         stated = sum(bag.stated.get(topic, bag.found[topic]) for topic in wanted)
         notes = (*bag.notes, *differences(bag, set(wanted)), *feed.notes())
-    return Read(shown, notes, feed.account(stated, shown), robot=robot)
+    return Read(shown, tuple(map(printable, notes)), feed.account(stated, shown), robot=robot)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -121,7 +121,7 @@ class _RobotFeed(Feed):
         try:
             message = self.types.decode(data, bound.kind)
         except Exception as err:  # whatever the generated decoders meet
-            raise UndecodableError(str(err)) from err
+            raise UndecodableError from err
         rows: list[Row] = []
         # What is done follows from what was there before this message.
         for channel, labeller in bound.labellers.items():

@@ -26,12 +26,14 @@ MAGIC: Final = b"SQLite format 3\0"
 #: Number of the topic of what stands for messages that are missing.
 GAP: Final = -1
 
-#: SQLite instructions that are granted per byte of a file, and to any file.
+#: SQLite instructions that are granted per byte of a file, and to any file: the shortest real
+#: messages, empty ones, need 1 for each byte.
 _STEPS_PER_BYTE: Final = 20
 _STEPS: Final = 1_000_000
 _STEPS_AT_ONCE: Final = 10_000
 _LEAST_LENGTH: Final = 1 << 16
 
+_JOURNAL: Final = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
 _LOG_HEAD: Final = 32
 _FRAME_HEAD: Final = 24
 
@@ -110,6 +112,10 @@ class SqliteFile:
             SqliteTopic(int(number), str(name), str(kind), str(encoding))
             for number, name, kind, encoding in rows
         )
+        if _has_journal(self.path):
+            # Pages may be there to which no others lead yet.
+            self._survey_pages("its recorder was killed while it wrote")
+            return
         if _is_cut(self.path):
             # SQLite would take what is missing of a page for zeros.
             self._survey_pages("it ends before its end")
@@ -120,6 +126,13 @@ class SqliteFile:
                 "SELECT topic_id, count(*) FROM messages NOT INDEXED GROUP BY topic_id"
             )
             self.found.update({_number(number): int(count) for number, count in counts})
+            [(highest,)] = self.connection.execute("SELECT max(id) FROM messages NOT INDEXED")
+            if isinstance(highest, int) and highest > (count := self.found.total()):
+                # Recorders number messages from 1.
+                self.notes.append(
+                    f"holds {count} messages, and their numbers go up to {highest}: others were "
+                    "deleted or are damaged"
+                )
         except sqlite3.DatabaseError as err:
             _refuse_interrupted(err)
             self._survey_pages(str(err))
@@ -223,6 +236,15 @@ def _frames_of(log: Path) -> int | None:
             if frame[8:16] != head[16:24]:
                 return number
     return frames
+
+
+def _has_journal(path: Path) -> bool:
+    """Whether there is a journal of a transaction that has not ended."""
+    journal = path.with_name(f"{path.name}-journal")
+    if not journal.is_file():
+        return False
+    with journal.open("rb") as file:
+        return file.read(len(_JOURNAL)) == _JOURNAL
 
 
 def _is_cut(path: Path) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from random import Random
+from typing import Final
 
 import numpy as np
 import strategies as some
@@ -28,6 +29,9 @@ from rebt_ros.logic.conditions import (
     PreviousActionIs,
 )
 from rebt_ros.storage.recording import RecordingWriter
+
+#: States of a bag, and actions.
+MESSAGES: Final = 20
 
 ACTION, STATE = "std_msgs/msg/String", "std_msgs/msg/Float64MultiArray"
 
@@ -150,7 +154,7 @@ def experiments() -> tuple[str, ...]:
 
 
 def bag(
-    path: Path, storage: StoragePlugin, compression: CompressionMode | None, count: int = 20
+    path: Path, storage: StoragePlugin, compression: CompressionMode | None, count: int = MESSAGES
 ) -> Path:
     """Writes a bag of as many states, and as many actions."""
     types = get_typestore(Stores.ROS2_JAZZY)

@@ -116,6 +116,10 @@ def _bags(directory: Path) -> Target:
             # Its metadata tell how many messages there were.
             [account] = loaded.accounts.values()
             assert account.read + sum(account.left_out.values()) == account.stated or loaded.notes
+        # Every seed has as many, whatever a mutated file says itself.
+        for account in loaded.accounts.values():
+            found = account.read + sum(account.left_out.values())
+            assert found >= 2 * corpus.MESSAGES or loaded.notes, (found, one)
 
     return Target("bags", make, read)
 

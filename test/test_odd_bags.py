@@ -1,0 +1,187 @@
+"""Bags as they are met in the field: names, times, encodings and places that are not the usual."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import mcap_files as mcap
+import pytest
+import test_bag_table as table
+
+from rebt_ros.errors import InputError
+from rebt_ros.storage.bag import read_bag
+
+MESSAGES = mcap.demonstration()
+
+
+def write(path: Path, state: str = "/state", action: str = "/action") -> Path:
+    """A file whose topics have these names."""
+    channels = [mcap.Channel(state, mcap.STATE), mcap.Channel(action, mcap.ACTION)]
+    return mcap.write(path, MESSAGES, channels)
+
+
+@pytest.mark.parametrize(
+    ("state", "action"),
+    [
+        (" /state", "/action "),
+        ("state", "action"),
+        ("", "/action"),
+        ("/größe", "/#1 50% ?"),
+        ("/state\n\x1b[31m", "/action"),
+        ("/state", "state"),
+    ],
+)
+def test_topics_may_have_any_name(tmp_path: Path, state: str, action: str) -> None:
+    read = read_bag(write(tmp_path / "bag.mcap", state, action))
+    assert len(read.demonstration) == 20
+    assert read.notes == ()
+
+
+def test_of_names_that_differ_in_their_slash_the_exact_one_is_meant(tmp_path: Path) -> None:
+    path = mcap.write(
+        tmp_path / "bag.mcap",
+        [*MESSAGES, mcap.Message(2, 1, mcap.action("other"))],
+        [*mcap.CHANNELS, mcap.Channel("action", mcap.ACTION)],
+    )
+    assert len(read_bag(path, action_topics=["/action"]).demonstration) == 20
+    assert read_bag(path, action_topics=["action"]).demonstration.actions == ("other",)
+
+
+@pytest.mark.parametrize(
+    "name", ["a # b", "50%", "q?x=1", "größe", "%2e%2e", "not\udcffutf8", "it's", "[x]*", "-v"]
+)
+@pytest.mark.parametrize("reader", ["mcap", "sqlite", "sqlite with a log", "packed sqlite"])
+def test_bags_may_have_any_name(tmp_path: Path, reader: str, name: str) -> None:
+    bag = table.READERS[reader](tmp_path / name)
+    (bag / table.METADATA).unlink()
+    for one in list(bag.iterdir()):
+        one.rename(bag / f"{name}{one.name}")
+    assert len(read_bag(bag).demonstration) == table.COUNT
+    file = bag / f"{name}{'bag_0.mcap' if reader == 'mcap' else 'bag_0.db3'}"
+    file = file if file.exists() else bag / f"{file.name}.zstd"
+    assert len(read_bag(file).demonstration) == table.COUNT
+
+
+def test_a_log_is_read_in_a_directory_for_reading_only_and_beside_what_a_link_leads_to(
+    tmp_path: Path,
+) -> None:
+    bag = table.READERS["sqlite with a log"](tmp_path / "bag")
+    link = tmp_path / "link.db3"
+    link.symlink_to(bag / "bag_0.db3")
+    bag.chmod(0o555)
+    try:
+        assert len(read_bag(bag).demonstration) == table.COUNT
+        assert len(read_bag(link).demonstration) == table.COUNT
+    finally:
+        bag.chmod(0o755)
+
+
+def test_a_link_that_leads_nowhere_is_called_so(tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "bag_0.mcap").symlink_to(tmp_path / "nothing.mcap")
+    with pytest.raises(InputError, match=r"bag_0.mcap is a link that leads nowhere"):
+        read_bag(tmp_path / "bag")
+
+
+@pytest.mark.parametrize("stamp", [lambda _: 0, lambda _: 7])
+def test_messages_without_times_are_taken_as_they_stand_with_a_note(
+    tmp_path: Path, stamp: Callable[[int], int]
+) -> None:
+    messages = [replace(one, stamp=stamp(one.stamp)) for one in MESSAGES]
+    path = mcap.write(tmp_path / "bag.mcap", messages)
+    read = read_bag(path)
+    [note] = read.notes
+    assert note.startswith("all messages were recorded at the same time")
+    assert read.demonstration.states[:, 1].tolist() == [float(-number) for number in range(20)]
+    with pytest.raises(InputError, match="at the same time"):
+        read_bag(path, sample_rate=10.0)
+
+
+def test_times_that_fall_are_sorted(tmp_path: Path) -> None:
+    messages = [replace(one, stamp=1000 - one.stamp) for one in MESSAGES]
+    path = mcap.write(tmp_path / "bag.mcap", messages, per_chunk=5)
+    assert read_bag(path).demonstration.states[:, 1].tolist() == [
+        float(-number) for number in range(19, 0, -1)
+    ]
+
+
+def test_text_that_is_not_utf8_and_other_encapsulations_are_unusable_messages(
+    tmp_path: Path,
+) -> None:
+    latin = mcap.Message(1, 98, b"\0\1\0\0\5\0\0\0gr\xf6\xdf\0")
+    other = mcap.Message(0, 99, b"\0\7" + MESSAGES[0].data[2:])
+    path = mcap.write(tmp_path / "bag.mcap", [*MESSAGES, latin, other])
+    with pytest.raises(InputError, match=r"message 21 on '/action' cannot be decoded .*skip-bad"):
+        read_bag(path)
+    read = read_bag(path, skip_bad=True)
+    assert read.account is not None
+    assert read.account.left_out == {"cannot be used": 2}
+    path = mcap.write(tmp_path / "other.mcap", [*MESSAGES, other])
+    with pytest.raises(InputError, match="it begins with 0007"):
+        read_bag(path)
+
+
+@pytest.mark.parametrize("encoding", ["ros1", "json", "protobuf", ""])
+def test_messages_in_other_encodings_are_named_where_there_are_no_others(
+    tmp_path: Path, encoding: str
+) -> None:
+    channels = [replace(one, encoding=encoding) for one in mcap.CHANNELS]
+    path = mcap.write(tmp_path / "bag.mcap", MESSAGES, channels, profile="")
+    with pytest.raises(InputError, match=rf"/state \({encoding or 'unknown'} messages\)"):
+        read_bag(path)
+
+
+def test_what_macos_leaves_beside_files_is_no_file_of_messages(tmp_path: Path) -> None:
+    bag = table.READERS["mcap"](tmp_path / "bag")
+    (bag / "._bag_0.mcap").write_bytes(b"\0\5\x16\7" + bytes(100))
+    assert read_bag(bag).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "why"),
+    [
+        ("x.mcap", b"", "the file is empty"),
+        ("x.db3", b"", "the file is empty"),
+        ("x.mcap", bytes(5000), "does not begin like an mcap file"),
+        ("x.db3", bytes(5000), "is not a database"),
+        ("x.mcap", b"<!DOCTYPE html><html>", "page of HTML"),
+        ("x.db3", b"PK\3\4" + bytes(50), "zip archive"),
+        ("x.mcap.zstd", b"nothing", "does not begin like packed data"),
+    ],
+)
+def test_what_is_no_bag_is_called_what_it_is(
+    tmp_path: Path, name: str, content: bytes, why: str
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=why):
+        read_bag(tmp_path / name)
+
+
+@pytest.mark.parametrize("suffix", [".mcap", ".db3"])
+def test_files_are_told_by_what_is_in_them(tmp_path: Path, suffix: str) -> None:
+    for number, reader in enumerate(("mcap", "sqlite")):
+        bag = table.READERS[reader](tmp_path / f"bag {number}")
+        (file,) = (one for one in bag.iterdir() if one.name != table.METADATA)
+        shutil.copyfile(file, tmp_path / f"{number}{suffix}")
+        assert len(read_bag(tmp_path / f"{number}{suffix}").demonstration) == table.COUNT
+
+
+def test_a_journal_tells_that_pages_may_not_be_linked(tmp_path: Path) -> None:
+    bag = table.READERS["sqlite"](tmp_path / "bag")
+    (bag / "bag_0.db3-journal").write_bytes(bytes.fromhex("d9d505f920a163d7") + bytes(500))
+    read = read_bag(bag)
+    assert len(read.demonstration) == table.COUNT
+    [note] = read.notes
+    assert "its recorder was killed while it wrote" in note
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read anything")
+def test_a_file_that_may_not_be_read_is_called_so(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag.mcap")
+    path.chmod(0)
+    with pytest.raises(InputError, match="check its permissions"):
+        read_bag(path)
