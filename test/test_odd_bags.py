@@ -41,6 +41,16 @@ def test_topics_may_have_any_name(tmp_path: Path, state: str, action: str) -> No
     assert read.notes == ()
 
 
+def test_a_topic_of_both_types_is_the_state_alone_unless_it_is_named(tmp_path: Path) -> None:
+    channels = [*mcap.CHANNELS, mcap.Channel("/state", mcap.ACTION)]
+    path = mcap.write(
+        tmp_path / "bag.mcap", [*MESSAGES, mcap.Message(2, 9, MESSAGES[1].data)], channels
+    )
+    read = read_bag(path)
+    assert read.demonstration.channels == ("/action",)
+    assert read.notes == ("left out: messages on /state of type std_msgs/msg/String: 1",)
+
+
 def test_of_names_that_differ_in_their_slash_the_exact_one_is_meant(tmp_path: Path) -> None:
     path = mcap.write(
         tmp_path / "bag.mcap",

@@ -76,11 +76,7 @@ def read_bag(
             if not kinds:
                 raise InputError(f"{path} holds no messages: record state and action topics first.")
             states = _chosen(path, kinds, names, STATE_TYPE, "state")
-            # No topic is both, unless the user says so.
-            others = {name: its for name, its in kinds.items() if name not in states}
-            actions = _chosen(
-                path, kinds if action_topics else others, action_topics, ACTION_TYPE, "action"
-            )
+            actions = _chosen(path, kinds, action_topics, ACTION_TYPE, "action", taken=states)
         topics = (
             [replace(one, name=name) for one, name in zip(state_topics, states, strict=True)]
             if state_topics
@@ -405,10 +401,15 @@ def kinds_of(bag: BagFiles) -> dict[str, dict[str, int]]:
 
 
 def _chosen(
-    path: Path, kinds: dict[str, dict[str, int]], names: Sequence[str], kind: str, role: str
+    path: Path,
+    kinds: dict[str, dict[str, int]],
+    names: Sequence[str],
+    kind: str,
+    role: str,
+    taken: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """The topics to read, by the names that the bag gives them."""
-    candidates = [topic for topic, its in kinds.items() if kind in its]
+    """The topics to read, as the bag has them; unless named, none that is taken."""
+    candidates = [topic for topic, its in kinds.items() if kind in its and topic not in taken]
     if not names and len(candidates) == 1:
         return (candidates[0],)
     if not names and candidates:

@@ -105,7 +105,7 @@ def _check_file(file: Path, directory: Path) -> None:
 
 def _check_place(file: Path, directory: Path) -> None:
     """Refuses what is no file, or stands elsewhere."""
-    if not file.exists():
+    if file.is_symlink() and not file.exists():
         raise InputError(f"{file} is a link that leads nowhere: put the file itself in its place.")
     if not stat.S_ISREG(file.stat().st_mode):
         raise InputError(f"{file} is not a file: take it out of the bag.")
