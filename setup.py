@@ -76,6 +76,7 @@ setup(
         PACKAGE: ["py.typed"],
         f"{PACKAGE}.behavior_tree": ["*.schema.json"],
         f"{PACKAGE}.robot_file": ["*.schema.json"],
+        f"{PACKAGE}.verification": ["*.schema.json"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
@@ -108,8 +109,10 @@ setup(
     cmdclass={"install_scripts": InstallScripts},
     entry_points={
         "console_scripts": [
+            f"check = {PACKAGE}.commands.check:main",
             f"demo = {PACKAGE}.commands.demo:main",
             f"experiment = {PACKAGE}.commands.experiment:main",
+            f"explain = {PACKAGE}.commands.explain:main",
             f"generate = {PACKAGE}.commands.generate:main",
             f"learn = {PACKAGE}.commands.learn:main",
             f"replay = {PACKAGE}.commands.replay:main",

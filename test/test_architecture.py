@@ -30,7 +30,7 @@ LAYERS: Final = (
     {PACKAGE},  # rebt_ros/__init__.py, the public interface
     {"offline", "study"},
     {"learning", "trial"},
-    {"storage", "simulated_robot", "drawing", "beyond_the_paper"},
+    {"storage", "simulated_robot", "drawing", "beyond_the_paper", "verification"},
     {"paper"},
     {"decision_tree"},
     {"behavior_tree"},
@@ -79,6 +79,7 @@ HOMES: Final = {
     "rosbags": ("rebt_ros.storage", "rebt_ros.storage.*"),
     "scipy": ("rebt_ros.study.edit_distance.program", "rebt_ros.study.edit_distance.relaxation"),
     "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
+    "yaml": ("rebt_ros.verification.rules_file",),
 }
 
 #: Run code that comes from data, or read formats that do.
@@ -290,7 +291,11 @@ def test_the_core_runs_where_ros_is_not_installed() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["experiment", "generate", "learn", "replay", "revise", "show", "simulate", "trial"]
+    "command",
+    [
+        *("check", "experiment", "explain", "generate", "learn", "replay", "revise", "show"),
+        *("simulate", "trial"),
+    ],
 )
 def test_offline_commands_need_no_ros(command: str) -> None:
     _run(f"{WITHOUT_ROS} importlib.import_module('rebt_ros.commands.{command}')")

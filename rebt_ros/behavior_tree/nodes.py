@@ -18,7 +18,7 @@ py_trees objects, JSON, pictures and predictions are views of these values.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import TypeAlias
 
@@ -99,6 +99,13 @@ def children(node: Node) -> tuple[Node, ...]:
     if isinstance(node, _Control):
         return node.children
     return (node.child,) if isinstance(node, Inverter) else ()
+
+
+def with_children(node: Node, family: tuple[Node, ...]) -> Node:
+    """The node with other children, as many as it must have; a leaf stays as it is."""
+    if isinstance(node, _Control):
+        return replace(node, children=family)
+    return Inverter(*family) if isinstance(node, Inverter) else node
 
 
 def walk(node: Node) -> Iterator[Node]:

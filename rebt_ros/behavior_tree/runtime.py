@@ -57,6 +57,17 @@ class SucceedAtOnce:
         """Never has anything to interrupt."""
 
 
+class AlwaysRunning:
+    """A commander whose actions never end."""
+
+    def update(self, action: nodes.Action) -> Status:
+        """Running."""
+        return Status.RUNNING
+
+    def halt(self, action: nodes.Action) -> None:
+        """Has nothing to interrupt."""
+
+
 @dataclass(frozen=True, slots=True)
 class Tick:
     """What one tick did."""

@@ -102,25 +102,25 @@ class Wording:
         positive = literal.positive
         match literal.condition:
             case Threshold(quantity=quantity, value=value) if value == KNOWN:
-                return f"{_quantity(quantity)} is {'known' if positive else 'missing'}"
+                return f"{quantity_text(quantity)} is {'known' if positive else 'missing'}"
             case Threshold(quantity=Difference(minuend=one, subtrahend=other), value=0):
-                return f"{_feature(one)} {'≤' if positive else '>'} {_feature(other)}"
+                return f"{feature_text(one)} {'≤' if positive else '>'} {feature_text(other)}"
             case Threshold(quantity=quantity, value=value):
                 sign = "≤" if positive else ">"
-                return f"{_quantity(quantity)} {sign} {self._number(quantity, value)}"
+                return f"{quantity_text(quantity)} {sign} {self._number(quantity, value)}"
             case Interval(quantity=quantity, above=above, at_most=at_most):
                 low, high = self._number(quantity, above), self._number(quantity, at_most)
-                between = f"{low} < {_quantity(quantity)} ≤ {high}"
+                between = f"{low} < {quantity_text(quantity)} ≤ {high}"
                 return between if positive else f"not ({between})"
             case IsTrue(feature=name):
-                return _feature(name) if positive else f"not {_feature(name)}"
+                return feature_text(name) if positive else f"not {feature_text(name)}"
             case HasCategory(feature=name, category=category):
-                return f"{_feature(name)} {'=' if positive else '≠'} {_name(category)}"
+                return f"{feature_text(name)} {'=' if positive else '≠'} {name_text(category)}"
             case PreviousActionIs(action=action):
-                return f"{'' if positive else 'not '}doing {_name(action)}"
+                return f"{'' if positive else 'not '}doing {name_text(action)}"
             case LastActionIs() as last:
                 sign = "=" if positive else "≠"
-                return f"last action {sign} {_name(last.action)}{self._before(last)}"
+                return f"last action {sign} {name_text(last.action)}{self._before(last)}"
 
     def _number(self, quantity: Quantity, value: float) -> str:
         return self._numbers.get(quantity, {}).get(value, repr(value))
@@ -137,7 +137,9 @@ class Wording:
                 return self.literal(literal)
             case nodes.Action(label=label, channel=channel):
                 return (
-                    f"{_name(label)} @{_name(channel)}" if self._channels_differ else _name(label)
+                    f"{name_text(label)} @{name_text(channel)}"
+                    if self._channels_differ
+                    else name_text(label)
                 )
             case nodes.Inverter():
                 return "not"
@@ -231,7 +233,7 @@ def heading(suggestion: Suggestion) -> str:
         SuggestionKind.SEQUENCE: "Sequence",
         SuggestionKind.REPEATER: "Repeater",
     }[suggestion.kind]
-    return f"Suggestion {_name(suggestion.id)}: {kind}, shown {how_often(suggestion)}"
+    return f"Suggestion {name_text(suggestion.id)}: {kind}, shown {how_often(suggestion)}"
 
 
 def how_often(suggestion: Suggestion) -> str:
@@ -300,24 +302,26 @@ def _without_zeros(decimal: str) -> str:
     return "0" if text == "-0" else text
 
 
-def _name(name: str) -> str:
+def name_text(name: str) -> str:
     """The name as it is where that cannot be misread, else quoted."""
     return name if _is_plain(name) else _quoted(name)
 
 
-def _feature(name: str) -> str:
-    return _quoted(name) if _is_number(name) else _name(name)
+def feature_text(name: str) -> str:
+    """The name of a feature, which stands beside numbers and so is none."""
+    return _quoted(name) if _is_number(name) else name_text(name)
 
 
-def _quantity(quantity: Quantity) -> str:
+def quantity_text(quantity: Quantity) -> str:
+    """What a threshold compares."""
     if isinstance(quantity, Difference):
-        return f"{_feature(quantity.minuend)} − {_feature(quantity.subtrahend)}"
-    return _feature(quantity)
+        return f"{feature_text(quantity.minuend)} − {feature_text(quantity.subtrahend)}"
+    return feature_text(quantity)
 
 
 def _word(name: str) -> str:
     """A name in a list of names."""
-    return _quoted(name) if any(one.isspace() or one in "()" for one in name) else _name(name)
+    return _quoted(name) if any(one.isspace() or one in "()" for one in name) else name_text(name)
 
 
 def _is_plain(name: str) -> bool:

@@ -82,11 +82,11 @@ def add_seed(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_input_options(parser: argparse.ArgumentParser) -> None:
+def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Adds INPUT... and how to read it."""
     parser.add_argument(
         "inputs",
-        nargs="+",
+        nargs="+" if required else "*",
         type=Path,
         metavar="INPUT",
         help="a rosbag2 bag (directory, .mcap or .db3), a recording of the recorder or a "

@@ -68,6 +68,23 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tup
         InputError: There are no rows, or they lack a channel or a feature that the tree tests.
     """
     policies = nodes.policies(learned.tree)
+    return tuple(
+        _replay(policies[table.channel], table) for table in rows_for(learned, demonstrations)
+    )
+
+
+def rows_for(
+    learned: LearnedTree, demonstrations: Sequence[Demonstration]
+) -> tuple[DemonstrationTable, ...]:
+    """Recorded rows as a tree reads them, with its features and channels; see `replay`.
+
+    Returns:
+        One for each channel of the tree that was recorded.
+
+    Raises:
+        InputError: There are no rows, or they lack a channel or a feature that the tree tests.
+    """
+    policies = nodes.policies(learned.tree)
     lags = max((feature.lag for feature in learned.features), default=0)
     tables = {
         table.channel: with_lags(shifted(table, _late(learned, table)), lags)
@@ -75,7 +92,7 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tup
     }
     if len(policies) == len(tables) == 1:
         [(channel, policy)], [table] = policies.items(), tables.values()
-        return (_replay(learned, channel, policy, table),)
+        return (_as_the_tree_reads(learned, channel, policy, table),)
     common = [channel for channel in policies if channel in tables]
     if not common:
         raise InputError(
@@ -84,7 +101,8 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tup
             "choose the action topics, or the label columns of a table."
         )
     return tuple(
-        _replay(learned, channel, policies[channel], tables[channel]) for channel in common
+        _as_the_tree_reads(learned, channel, policies[channel], tables[channel])
+        for channel in common
     )
 
 
@@ -114,17 +132,14 @@ def _late(learned: LearnedTree, table: DemonstrationTable) -> int:
     return rows_in(table, seconds) if seconds is not None and tells_time(table) else rows
 
 
-def _replay(
-    learned: LearnedTree, channel: str, policy: nodes.Node, recorded: DemonstrationTable
-) -> Replay:
-    table = _as_the_tree_reads(learned, channel, policy, recorded)
+def _replay(policy: nodes.Node, table: DemonstrationTable) -> Replay:
     own = evaluation.own_history_choices(policy, table)
     forced = evaluation.teacher_forced_choices(policy, table)
     confusion = np.zeros((len(table.actions), len(table.actions) + 1), dtype=np.int64)
     # NO_ACTION is -1 and so counts in the last column.
     np.add.at(confusion, (table.chosen, own), 1)
     return Replay(
-        channel,
+        table.channel,
         len(table),
         float(np.mean(forced == table.chosen)),
         float(np.mean(own == table.chosen)),

@@ -1,0 +1,118 @@
+"""``ros2 run rebt_ros check TREE``: what a learned tree does in every state, and its rules."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from rebt_ros.behavior_tree.wording import Wording
+from rebt_ros.commands.shell import add_input_options, input_options, parse, run
+from rebt_ros.offline import check_and_explain
+from rebt_ros.offline.check_and_explain import Checked
+from rebt_ros.verification.comparing import Comparison
+from rebt_ros.verification.describing import action_text
+from rebt_ros.verification.findings import Findings
+from rebt_ros.verification.proof import Answer
+from rebt_ros.verification.sweep import Results
+from rebt_ros.verification.verdict_text import details, regions
+
+#: Exit code where a rule is broken or unknown.
+_NOT_KEPT: Final = 1
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(
+        prog="check",
+        description="Proves or refutes rules of a learned tree for every state, and says what is "
+        "noticeable about it. The exit code is 1 where a rule is not proven.",
+    )
+    parser.add_argument("tree", type=Path, metavar="TREE", help="tree.json of a learned tree")
+    parser.add_argument("--rules", type=Path, metavar="FILE", help="rules.yaml (docs/rules.md)")
+    parser.add_argument(
+        "--against", type=Path, metavar="TREE", help="another tree: where do they differ?"
+    )
+    parser.add_argument(
+        "--action-results",
+        action="store_true",
+        help="the robot reports how actions end, so that they may fail or go on "
+        "(the executor's action_result_topic)",
+    )
+    parser.add_argument(
+        "--regions",
+        type=int,
+        default=3,
+        metavar="N",
+        help="how many regions to list each time (default: %(default)s)",
+    )
+    add_input_options(parser, required=False)
+    parsed = parse(parser, arguments)
+    run(lambda: _check(parsed), "check")
+
+
+def _check(parsed: argparse.Namespace) -> None:
+    checked = check_and_explain.check(
+        parsed.tree,
+        parsed.rules,
+        parsed.inputs,
+        against=parsed.against,
+        reading=input_options(parsed),
+        results=Results.REPORTED if parsed.action_results else Results.AT_ONCE,
+    )
+    most = max(parsed.regions, 1)
+    print("\n".join(_lines(checked, most)))
+    if not checked.keeps_all:
+        sys.stdout.flush()
+        sys.exit(_NOT_KEPT)
+
+
+def _lines(checked: Checked, most: int) -> Iterator[str]:
+    for verdict in checked.verdicts:
+        kept = verdict.answer is Answer.PROVEN
+        answer = verdict.answer.value if kept else verdict.answer.value.upper()
+        yield f"{answer:<8} {verdict.demand.rule}"
+        for line in details(checked.learned, checked.proofs, verdict, most):
+            yield f"         {line}"
+    if checked.verdicts:
+        yield ""
+    several = len(checked.findings) > 1
+    wording = Wording(checked.learned)
+    for findings in checked.findings:
+        if several:
+            yield f"Channel {findings.channel}:"
+        yield from _noticeable(findings, wording, most)
+    for comparison in checked.comparisons:
+        yield ""
+        yield f"Against the other tree{f', channel {comparison.channel}' if several else ''}:"
+        yield from _divergences(comparison, most)
+
+
+def _noticeable(findings: Findings, wording: Wording, most: int) -> Iterator[str]:
+    lines = [
+        *(f"never reached: {wording.node(node)}" for node in findings.dead),
+        *(f"never decides: {wording.node(node)}" for node in findings.pointless),
+        *(f"shown, but never chosen: {action_text(one)}" for one in findings.never_chosen),
+    ]
+    if findings.idle.shape[1]:
+        lines += regions("nothing is commanded", findings.idle, findings.grid, most)
+    for leaf, boxes in findings.never_shown:
+        lines += regions(f"never shown: {action_text(leaf)}", boxes, findings.grid, most)
+    yield from lines or ["Nothing is noticeable about the tree."]
+
+
+def _divergences(comparison: Comparison, most: int) -> Iterator[str]:
+    if not comparison.divergences:
+        yield "both do the same in every state."
+    for one in comparison.divergences:
+        what = f"{action_text(one.mine)} instead of {action_text(one.other)}"
+        yield from regions(what, one.boxes, comparison.grid, most)
+        if one.rows is not None:
+            rows = "1 row that was shown lies" if one.rows == 1 else f"{one.rows} rows shown lie"
+            yield f"    {rows} there"
+
+
+if __name__ == "__main__":
+    main()

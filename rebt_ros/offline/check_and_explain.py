@@ -1,0 +1,197 @@
+"""Checks of learned trees: the Python side of the commands ``check`` and ``explain``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import OptionError
+from rebt_ros.learning.replaying import rows_for
+from rebt_ros.storage.inputs import InputOptions, load
+from rebt_ros.storage.text import read_text
+from rebt_ros.storage.tree_file import read_tree
+from rebt_ros.verification.comparing import Comparison, compare
+from rebt_ros.verification.contradictions import refuse_contradictions
+from rebt_ros.verification.explaining import Explanation
+from rebt_ros.verification.explaining import explain as explain_state
+from rebt_ros.verification.findings import Findings, find
+from rebt_ros.verification.proof import Answer, ChannelProof, Verdict, verdicts
+from rebt_ros.verification.proof import check as prove
+from rebt_ros.verification.resolving import demands
+from rebt_ros.verification.rules import RuleSet
+from rebt_ros.verification.rules_file import loads
+from rebt_ros.verification.sweep import Results
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Checked:
+    """What is known of a tree."""
+
+    learned: LearnedTree
+    proofs: tuple[ChannelProof, ...]
+    """Of each channel."""
+    verdicts: tuple[Verdict, ...]
+    """Of each rule, in their order."""
+    findings: tuple[Findings, ...]
+    comparisons: tuple[Comparison, ...]
+    """With another tree, where one was given."""
+    rows: tuple[DemonstrationTable, ...]
+    """What was shown, where it was given."""
+
+    @property
+    def keeps_all(self) -> bool:
+        """Whether every rule is proven."""
+        return all(one.answer is Answer.PROVEN for one in self.verdicts)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Situation:
+    """A state, and what was done before."""
+
+    values: tuple[float, ...]
+    """One for each feature of the tree, as tables hold them."""
+    histories: Mapping[str, ActionHistory]
+    """By channel."""
+
+
+def read_rules(path: str | Path) -> RuleSet:
+    """Reads a file of rules.
+
+    Raises:
+        InputError: There is no such text file.
+        RuleError: It is malformed.
+    """
+    return loads(read_text(Path(path)), str(path))
+
+
+def check(
+    tree: LearnedTree | str | Path,
+    rules: RuleSet | str | Path | None = None,
+    inputs: Sequence[str | Path] = (),
+    *,
+    against: LearnedTree | str | Path | None = None,
+    reading: InputOptions | None = None,
+    results: Results = Results.AT_ONCE,
+) -> Checked:
+    """Proves or refutes rules for every state, and looks for what is noticeable about a tree.
+
+    Args:
+        tree: A learned tree, or the file of one.
+        rules: Rules, or the file of some.
+        inputs: What was shown: bags, recordings and CSV tables.
+        against: Another tree, or its file, that the tree is compared with.
+        reading: How to read the inputs.
+        results: How actions end.
+
+    Raises:
+        RebtError: A file cannot be used, or rules do not fit the tree or each other.
+    """
+    learned = _learned(tree)
+    ruled = rules if isinstance(rules, RuleSet) or rules is None else read_rules(rules)
+    asked = () if ruled is None else demands(ruled, learned)
+    if ruled is not None:
+        refuse_contradictions(ruled.source, asked, learned)
+    tables = _rows(learned, inputs, reading)
+    proofs = prove(learned, asked, tables, results)
+    return Checked(
+        learned,
+        proofs,
+        verdicts(proofs, asked),
+        find(learned, tables, results),
+        () if against is None else compare(learned, _learned(against), tables),
+        tables,
+    )
+
+
+def explain(
+    tree: LearnedTree | str | Path,
+    values: Sequence[float],
+    histories: Mapping[str, ActionHistory] | None = None,
+    inputs: Sequence[str | Path] = (),
+    *,
+    reading: InputOptions | None = None,
+) -> tuple[Explanation, ...]:
+    """Why a tree does in a state what it does, channel by channel.
+
+    Args:
+        tree: A learned tree, or the file of one.
+        values: One for each of its features, as tables hold them.
+        histories: What was done before, by channel; nothing by default.
+        inputs: What was shown: bags, recordings and CSV tables.
+        reading: How to read the inputs.
+
+    Raises:
+        RebtError: A file cannot be used.
+    """
+    learned = _learned(tree)
+    return explain_state(learned, values, histories, _rows(learned, inputs, reading))
+
+
+def row_of(
+    learned: LearnedTree,
+    row: int,
+    demonstration: str | None,
+    inputs: Sequence[str | Path],
+    *,
+    reading: InputOptions | None = None,
+) -> Situation:
+    """A row of a recording as the tree met it.
+
+    Args:
+        learned: The tree.
+        row: Its place in the demonstration, from 0.
+        demonstration: Its name; may be None if there is only one.
+        inputs: What was shown.
+        reading: How to read it.
+
+    Raises:
+        RebtError: There is no such row, or an input cannot be used.
+    """
+    tables = _rows(learned, inputs, reading)
+    if not tables:
+        raise OptionError("name the INPUT that has the row.")
+    names = tables[0].demonstrations
+    if demonstration is None and len(names) > 1:
+        raise OptionError(
+            f"there are {len(names)} demonstrations ({', '.join(names[:3])}, …): name one with "
+            "--demonstration."
+        )
+    wanted = names[0] if demonstration is None else demonstration
+    if wanted not in names:
+        raise OptionError(f"there is no demonstration {wanted!r}: there are {', '.join(names)}.")
+    values: tuple[float, ...] = ()
+    histories: dict[str, ActionHistory] = {}
+    for table in tables:
+        mine = np.flatnonzero(table.demonstration == names.index(wanted))
+        if not 0 <= row < len(mine):
+            raise OptionError(f"{wanted} has {len(mine)} rows, from 0: there is no row {row}.")
+        place = int(mine[row])
+        values = tuple(table.states[place].tolist())
+        done = [table.actions[code] for code in table.chosen[mine[:row]].tolist()]
+        histories[table.channel] = ActionHistory(done)
+    return Situation(values, histories)
+
+
+def _learned(tree: LearnedTree | str | Path) -> LearnedTree:
+    return tree if isinstance(tree, LearnedTree) else read_tree(Path(tree))
+
+
+def _rows(
+    learned: LearnedTree, inputs: Sequence[str | Path], reading: InputOptions | None
+) -> tuple[DemonstrationTable, ...]:
+    if not inputs:
+        return ()
+    reading = reading or InputOptions()
+    names = frozenset(feature.name for feature in learned.features)
+    policies = tuple(nodes.policies(learned.tree))
+    reading = replace(reading, features=reading.features | names)
+    if len(policies) > 1:
+        reading = replace(reading, channels=reading.channels or policies)
+    return rows_for(learned, load(tuple(map(Path, inputs)), reading).demonstrations)

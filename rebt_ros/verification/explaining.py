@@ -1,0 +1,250 @@
+"""Why a tree does in a state what it does, and what would have to change for something else."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import LastActionIs, PreviousActionIs, features_of
+from rebt_ros.verification.acting import Step, acting_leaves, commanding, trace
+from rebt_ros.verification.grid import Boxes, Field, Grid
+from rebt_ros.verification.proof import grid_of, policies_of
+from rebt_ros.verification.reference import Reference, of_table, of_tree
+from rebt_ros.verification.states import Point, Unsettled, nearest
+from rebt_ros.verification.sweep import Results, Sweep, Ticks, sweep
+
+#: How many rows that taught a branch are named.
+_ROWS_NAMED: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """The rows in which a branch acts."""
+
+    rows: int
+    actions: tuple[tuple[str, int], ...]
+    """What was done in them, the most frequent action first."""
+    demonstrations: tuple[tuple[str, int, float], ...]
+    """The demonstrations with most of them: name, rows, seconds from its start to the first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flip:
+    """A change of the state that makes the tree do something else."""
+
+    feature: str | None
+    """What changes; None if several features, or what was done before, have to."""
+    point: Point
+    """The changed state."""
+    action: nodes.Action | None
+    """What is done there; None: nothing."""
+    distance: float
+    """A sum over the features, in shares of all that was shown of each."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Explanation:
+    """Why one channel does what it does."""
+
+    channel: str
+    trace: Step
+    action: nodes.Action | None
+    """What is commanded; None: nothing."""
+    support: Support | None
+    """None where rows are not at hand, or nothing is commanded."""
+    flips: tuple[Flip, ...]
+    """The least change of each feature that suffices by itself, the smallest first; where there is
+    none, the least change of several."""
+    grid: Grid
+
+
+def explain(
+    learned: LearnedTree,
+    values: Sequence[float],
+    histories: Mapping[str, ActionHistory] | None = None,
+    tables: Sequence[DemonstrationTable] = (),
+) -> tuple[Explanation, ...]:
+    """Why a tree does in a state what it does, channel by channel.
+
+    Args:
+        learned: The tree.
+        values: One for each of its features.
+        histories: What was done before, by channel; nothing by default.
+        tables: What was shown, with the features of the tree.
+
+    Raises:
+        RuleError: The tree cannot be explained.
+    """
+    of_channel = {table.channel: table for table in tables}
+    return tuple(
+        _explained(
+            learned,
+            channel,
+            tree,
+            tuple(values),
+            (histories or {}).get(channel, ActionHistory()),
+            of_channel.get(channel),
+        )
+        for channel, tree in policies_of(learned).items()
+    )
+
+
+def _explained(
+    learned: LearnedTree,
+    channel: str,
+    tree: nodes.Node,
+    values: tuple[float, ...],
+    history: ActionHistory,
+    table: DemonstrationTable | None,
+) -> Explanation:
+    traced = trace(tree, learned.features, values, history)
+    acting = commanding(traced, tree)
+    action = acting.node if acting is not None and isinstance(acting.node, nodes.Action) else None
+    grid = grid_of(learned, [tree])
+    done = sweep(tree, grid, Results.AT_ONCE, Ticks.FIRST)
+    shown = of_tree(learned, channel) if table is None else of_table(table)
+    flips = tuple(_flips(learned, grid, done, values, history, action, shown))
+    support = None
+    if table is not None and acting is not None:
+        support = _support(tree, table, acting.leaf)
+    return Explanation(channel, traced, action, support, flips, grid)
+
+
+def _support(tree: nodes.Node, table: DemonstrationTable, leaf: int) -> Support:
+    rows = np.flatnonzero(acting_leaves(tree, table) == leaf)
+    labels = Counter(table.actions[code] for code in table.chosen[rows].tolist())
+    numbers = Counter(table.demonstration[rows].tolist())
+    named = []
+    for number, count in numbers.most_common(_ROWS_NAMED):
+        start = int(np.searchsorted(table.demonstration, number))
+        first = int(rows[table.demonstration[rows] == number][0])
+        seconds = float(table.stamps[first] - table.stamps[start]) / 1e9
+        named.append((table.demonstrations[number], count, seconds))
+    return Support(len(rows), tuple(labels.most_common()), tuple(named))
+
+
+def _flips(
+    learned: LearnedTree,
+    grid: Grid,
+    done: Sweep,
+    values: tuple[float, ...],
+    history: ActionHistory,
+    action: nodes.Action | None,
+    shown: Reference,
+) -> Iterator[Flip]:
+    here = np.array([values])
+    origin = Reference(here, here, shown.scale, None)
+    differs = ~done.commands(action) if action is not None else done.commanding >= 0
+    boxes = done.boxes[:, differs]
+    now = _cells_of(grid, learned, values, history)
+    kept = _same(grid, boxes, now)
+    single = []
+    for feature in learned.features:
+        if grid.field(feature.name) is None:
+            continue
+        others = [
+            place for place, field in enumerate(grid.fields) if not _concerns(field, feature.name)
+        ]
+        there = _pinned(grid, boxes[:, kept[others].all(axis=0)], now, others)
+        flip = _flip(learned, grid, done, there, origin, feature.name)
+        if flip is not None:
+            single.append(flip)
+    yield from sorted(single, key=lambda one: one.distance)
+    if not single:
+        flip = _flip(learned, grid, done, boxes, origin, None)
+        if flip is not None:
+            yield flip
+
+
+def _cells_of(
+    grid: Grid, learned: LearnedTree, values: Sequence[float], history: ActionHistory
+) -> list[int]:
+    """The cell of a state in each field."""
+    by_name = dict(zip((one.name for one in learned.features), values, strict=True))
+    cells = []
+    for field in grid.fields:
+        if field.quantity is None:
+            cells.append(grid.cell_of(history))
+        elif isinstance(field.quantity, str):
+            cells.append(field.cell(by_name[field.quantity]))
+        else:
+            minuend, subtrahend = field.quantity.minuend, field.quantity.subtrahend
+            cells.append(field.cell(by_name[minuend] - by_name[subtrahend]))
+    return cells
+
+
+def _same(grid: Grid, boxes: Boxes, now: Sequence[int]) -> BoolArray:
+    """Which boxes have the cell of a state, shape (fields, boxes)."""
+    return np.array(
+        [field.cells_of(boxes)[:, cell] for field, cell in zip(grid.fields, now, strict=True)],
+        dtype=bool,
+    ).reshape(len(grid.fields), boxes.shape[1])
+
+
+def _pinned(grid: Grid, boxes: Boxes, now: Sequence[int], fields: Sequence[int]) -> Boxes:
+    """The boxes with nothing but the cell of a state in some fields."""
+    pinned = boxes.copy()
+    for place in fields:
+        field = grid.fields[place]
+        only = np.zeros(field.cells, dtype=bool)
+        only[now[place]] = True
+        pinned[field.words] = field.chosen(only)[:, np.newaxis]
+    return pinned
+
+
+def _concerns(field: Field, feature: str) -> bool:
+    if field.quantity is None or isinstance(field.quantity, str):
+        return field.quantity == feature
+    return feature in (field.quantity.minuend, field.quantity.subtrahend)
+
+
+def _flip(
+    learned: LearnedTree,
+    grid: Grid,
+    done: Sweep,
+    boxes: Boxes,
+    origin: Reference,
+    feature: str | None,
+) -> Flip | None:
+    try:
+        near = nearest(boxes, grid, learned.features, origin)
+    except Unsettled:
+        return None
+    if near is None:
+        return None
+    point = near.point
+    history = ActionHistory() if point.before is None else point.before.history()
+    cells = _cells_of(grid, learned, point.values, history)
+    there = np.flatnonzero(_same(grid, done.boxes, cells).all(axis=0))
+    action = done.command(int(there[0])) if len(there) else None
+    return Flip(feature, point, action, near.distance)
+
+
+def failing(step: Step) -> Iterator[nodes.Condition]:
+    """The conditions that kept a branch from acting."""
+    if isinstance(step.node, nodes.Condition):
+        yield step.node
+        return
+    decided = step.children
+    if isinstance(step.node, nodes.Sequence | nodes.Repeater):
+        # The last one that was ticked is the one that failed.
+        decided = step.children[-1:]
+    for child in decided:
+        yield from failing(child)
+
+
+def values_read(condition: nodes.Condition) -> tuple[str, ...]:
+    """The features whose values stand beside a condition."""
+    tested = condition.literal.condition
+    if isinstance(tested, PreviousActionIs | LastActionIs):
+        return ()
+    return features_of(tested)

@@ -1,0 +1,280 @@
+"""Whether a tree keeps its rules, in every state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import reduce
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.prediction import States, history_columns
+from rebt_ros.behavior_tree.runtime import AlwaysRunning, SucceedAtOnce, TreeRuntime, executable
+from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Condition, Literal
+from rebt_ros.verification.errors import RuleError
+from rebt_ros.verification.formulas import AllOf, Formula, conditions_of
+from rebt_ros.verification.grid import Boxes, Grid
+from rebt_ros.verification.reference import Reference, of_table, of_tree
+from rebt_ros.verification.rules import Demand
+from rebt_ros.verification.states import Near, Point, Unsettled, nearest
+from rebt_ros.verification.sweep import Results, Sweep, Ticks, remembers, sweep
+
+
+class Answer(Enum):
+    """What is known of a rule."""
+
+    PROVEN = "proven"
+    """The tree keeps it in every state, whatever was done before."""
+    BROKEN = "broken"
+    """There is a state in which it does not."""
+    UNKNOWN = "unknown"
+    """Neither was shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShownRow:
+    """A row of a demonstration."""
+
+    demonstration: str
+    row: int
+    """Its place in the demonstration, from 0."""
+    action: str
+    """What was done."""
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """A state in which a rule is broken: of all of them, the nearest to what was shown."""
+
+    point: Point
+    command: nodes.Action | None
+    """What the tree commands there; None: nothing."""
+    row: ShownRow | None
+    """The row that is nearest; None where rows are not at hand."""
+    distance: float
+    """From what was shown: a sum over the features, in shares of all that was shown of each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """How much of what a rule is about was shown."""
+
+    rows: int
+    """In the states that it is about."""
+    all_rows: int
+    breaking: int
+    """Rows in which the demonstrator did what the rule forbids, or left what it demands."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Verdict:
+    """What is known of one rule."""
+
+    demand: Demand
+    answer: Answer
+    witness: Witness | None = None
+    """Of a broken rule."""
+    region: Boxes | None = None
+    """Of a broken rule, the boxes of all states in which it is broken."""
+    why: str = ""
+    """Of a rule that is unknown: what it depends on."""
+    coverage: Coverage | None = None
+    """None where rows are not at hand."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ChannelProof:
+    """The rules about one channel."""
+
+    channel: str
+    grid: Grid
+    first: Sweep
+    """What the tree does in a first tick."""
+    verdicts: tuple[Verdict, ...]
+
+
+def check(
+    learned: LearnedTree,
+    demands: Sequence[Demand],
+    tables: Iterable[DemonstrationTable] = (),
+    results: Results = Results.AT_ONCE,
+) -> tuple[ChannelProof, ...]:
+    """Proves or refutes the rules of a tree.
+
+    Args:
+        learned: The tree.
+        demands: Its rules.
+        tables: What was shown, with the features of the tree; a tree knows the ranges itself.
+        results: How actions end.
+
+    Returns:
+        One for each channel, its rules in the order of `demands`.
+
+    Raises:
+        RuleError: The rules, or the tree, are too large.
+    """
+    shown = {table.channel: of_table(table) for table in tables}
+    policies = policies_of(learned)
+    channels = dict.fromkeys((*policies, *(action.channel for action in learned.actions)))
+    return tuple(
+        _ChannelCheck(
+            learned,
+            channel,
+            policies.get(channel),
+            shown[channel] if channel in shown else of_tree(learned, channel),
+            results,
+        ).proof([one for one in demands if one.action.channel == channel])
+        for channel in channels
+    )
+
+
+def policies_of(learned: LearnedTree) -> dict[str, nodes.Node]:
+    """The tree of each channel, as it is executed.
+
+    Raises:
+        RuleError: Channels share a tree.
+    """
+    policies = nodes.policies(executable(learned.tree))
+    mixed = {action.channel for action in nodes.actions(learned.tree)} - policies.keys()
+    if mixed:
+        raise RuleError(
+            f"the tree mixes the channel {min(mixed)!r} with others in one policy: put the "
+            "policies of several channels side by side under a Parallel."
+        )
+    return policies
+
+
+def verdicts(proofs: Sequence[ChannelProof], demands: Sequence[Demand]) -> tuple[Verdict, ...]:
+    """The verdicts of all channels, in the order of the rules."""
+    of: Mapping[int, Verdict] = {
+        id(verdict.demand): verdict for proof in proofs for verdict in proof.verdicts
+    }
+    return tuple(of[id(one)] for one in demands)
+
+
+def grid_of(
+    learned: LearnedTree, trees: Iterable[nodes.Node | None], formulas: Iterable[Formula] = ()
+) -> Grid:
+    """The grid of the conditions of some trees and formulas."""
+    asked: list[Condition] = [
+        node.literal.condition for tree in trees if tree for node in nodes.conditions(tree)
+    ]
+    asked += [condition for formula in formulas for condition in conditions_of(formula)]
+    return Grid(learned.features, asked)
+
+
+@dataclass(frozen=True, slots=True)
+class _ChannelCheck:
+    learned: LearnedTree
+    channel: str
+    tree: nodes.Node | None
+    shown: Reference
+    results: Results
+
+    def proof(self, demands: Sequence[Demand]) -> ChannelProof:
+        grid = grid_of(self.learned, [self.tree], [one.region for one in demands])
+        first = sweep(self.tree, grid, self.results, Ticks.FIRST)
+        any_tick = (
+            sweep(self.tree, grid, self.results, Ticks.ANY)
+            if demands and remembers(self.tree, self.results)
+            else None
+        )
+        found = tuple(self._verdict(one, grid, first, any_tick) for one in demands)
+        return ChannelProof(self.channel, grid, first, found)
+
+    def _verdict(self, demand: Demand, grid: Grid, first: Sweep, any_tick: Sweep | None) -> Verdict:
+        coverage = self._coverage(demand)
+        region = breaking(demand, grid, first)
+        why = ""
+        if region.shape[1]:
+            try:
+                near = nearest(region, grid, self.learned.features, self.shown)
+            except Unsettled:
+                near, why = None, "it depends on which differences of features there are"
+            if near is not None:
+                witness = self._witness(demand, near)
+                return Verdict(demand, Answer.BROKEN, witness, region, coverage=coverage)
+        if any_tick is not None and not why:
+            why = self._why_unknown(demand, grid, any_tick)
+        answer = Answer.UNKNOWN if why else Answer.PROVEN
+        return Verdict(demand, answer, why=why, coverage=coverage)
+
+    def _why_unknown(self, demand: Demand, grid: Grid, any_tick: Sweep) -> str:
+        region = breaking(demand, grid, any_tick)
+        try:
+            if nearest(region, grid, self.learned.features, self.shown) is None:
+                return ""
+        except Unsettled:
+            pass
+        return (
+            "it depends on what the tree remembers, or on how its actions end: a first tick keeps "
+            "it, a later one may not"
+        )
+
+    def _witness(self, demand: Demand, near: Near) -> Witness:
+        command = command_in(self.learned, self.channel, near.point, self.results)
+        assert (command == demand.action) is (demand.forbids is not None), (demand, near, command)
+        table = self.shown.table
+        row = None
+        if table is not None and near.row is not None:
+            number = int(table.demonstration[near.row])
+            begin = int(np.searchsorted(table.demonstration, number))
+            label = table.actions[int(table.chosen[near.row])]
+            row = ShownRow(table.demonstrations[number], near.row - begin, label)
+        return Witness(near.point, command, row, near.distance)
+
+    def _coverage(self, demand: Demand) -> Coverage | None:
+        table = self.shown.table
+        if table is None:
+            return None
+        about = _holds(demand.region, table)
+        label = demand.action.label
+        code = table.actions.index(label) if label in table.actions else -1
+        done = table.chosen == code
+        breaking_rows = about & (done if demand.forbids is not None else ~done)
+        return Coverage(int(about.sum()), len(table), int(breaking_rows.sum()))
+
+
+def command_in(
+    learned: LearnedTree, channel: str, point: Point, results: Results = Results.AT_ONCE
+) -> nodes.Action | None:
+    """What a tree commands on a channel in a first tick in a state; None: nothing."""
+    history = ActionHistory() if point.before is None else point.before.history()
+    runtime = TreeRuntime(
+        learned,
+        AlwaysRunning() if results is Results.REPORTED else SucceedAtOnce(),
+        executable(learned.tree),
+        {channel: history},
+    )
+    commands = runtime.tick(point.values).commands
+    return next((one for one in commands if one.channel == channel), None)
+
+
+def breaking(demand: Demand, grid: Grid, done: Sweep) -> Boxes:
+    """The boxes in which a tree breaks a rule."""
+    forbidden = demand.forbids
+    if forbidden is not None:
+        return grid.within(done.boxes[:, done.commands(demand.action)], forbidden)
+    return grid.within(done.boxes[:, ~done.commands(demand.action)], demand.when)
+
+
+def _holds(formula: Formula, table: DemonstrationTable) -> BoolArray:
+    """In which rows a formula holds, shape (rows,)."""
+    columns = history_columns(table.actions, table.previous, table.last)
+    states = States(table.features, table.states, columns)
+
+    def holds(one: Formula) -> BoolArray:
+        if isinstance(one, Literal):
+            return states.satisfy(one)
+        parts = [holds(part) for part in one.parts]
+        if isinstance(one, AllOf):
+            return reduce(np.logical_and, parts, np.ones(len(table), dtype=bool))
+        return reduce(np.logical_or, parts, np.zeros(len(table), dtype=bool))
+
+    return holds(formula)

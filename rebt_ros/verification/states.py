@@ -1,0 +1,382 @@
+"""States that lie in a box, the nearest to what was shown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, FloatArray
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.logic.conditions import Difference
+from rebt_ros.verification.grid import ANOTHER_ACTION, LARGEST, Boxes, Field, Grid, HistoryCell
+from rebt_ros.verification.reference import Reference
+
+#: Most combinations of ranges of features and differences that are tried in a box.
+_MOST_COMBINATIONS: Final = 2_000
+#: How far inside of a range a value is chosen, as a share of all that was shown.
+_INSIDE: Final = 0.01
+#: Most boxes that each row is compared with.
+_MOST_COMPARISONS: Final = 2_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A state, and what was done before."""
+
+    values: tuple[float, ...]
+    """In the order of the features of the tree."""
+    before: HistoryCell | None
+    """None where that does not matter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Near:
+    """A point, and the row that is nearest to it."""
+
+    point: Point
+    row: int | None
+    """Its place in the reference; None where there is none."""
+    distance: float
+    """From there: the sum over the features, each in shares of all that was shown of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Range:
+    """Values ``above < x <= at_most`` of neighbouring cells; of missing ones, both are NaN."""
+
+    above: float
+    at_most: float
+
+    @property
+    def missing(self) -> bool:
+        return math.isnan(self.at_most)
+
+
+class Unsettled(Exception):  # noqa: N818 - an answer rather than an error
+    """Whether a box has a state could not be found out."""
+
+
+def nearest(boxes: Boxes, grid: Grid, features: Sequence[Feature], shown: Reference) -> Near | None:
+    """The state in some boxes that lies nearest to what was shown.
+
+    Args:
+        boxes: Any number of them.
+        grid: Theirs.
+        features: All features of the tree.
+        shown: What was shown; without rows, any state is as near as any other one.
+
+    Returns:
+        None where the boxes have no state.
+
+    Raises:
+        Unsettled: Some boxes could not be settled, and no other one has a state.
+    """
+    finder = _Finder(grid, features, shown)
+    unsettled = False
+    for place, row, distance in finder.candidates(boxes):
+        try:
+            point = finder.point(boxes[:, place], row)
+        except Unsettled:
+            unsettled = True
+            continue
+        if point is not None:
+            return Near(point, row, distance)
+    if unsettled:
+        raise Unsettled
+    return None
+
+
+class _Finder:
+    def __init__(self, grid: Grid, features: Sequence[Feature], shown: Reference) -> None:
+        self._grid = grid
+        self._features = features
+        self._shown = shown
+        self._place = {feature.name: place for place, feature in enumerate(features)}
+
+    def candidates(self, boxes: Boxes) -> Iterator[tuple[int, int | None, float]]:
+        """The boxes with the row that is nearest to each, the nearest ones first."""
+        count = boxes.shape[1]
+        if not len(self._shown):
+            yield from ((place, None, 0.0) for place in range(count))
+            return
+        most = max(1, _MOST_COMPARISONS // len(self._shown))
+        found = []
+        for place in range(min(count, most)):
+            distances = self._distances(boxes[:, place])
+            row = int(np.argmin(distances))
+            found.append((float(distances[row]), place, row))
+        for distance, place, row in sorted(found):
+            yield place, row, distance
+        yield from ((place, 0, math.inf) for place in range(most, count))
+
+    def _distances(self, box: Boxes) -> FloatArray:
+        """How far the box is from each row; differences of features do not count."""
+        total = np.zeros(len(self._shown))
+        for field, cells in self._restricted(box):
+            if isinstance(field.quantity, str):
+                column = self._place[field.quantity]
+                total += self._distances_of(field, cells, column)
+        return total
+
+    def _distances_of(self, field: Field, cells: BoolArray, column: int) -> FloatArray:
+        low, high = self._shown.low[:, column], self._shown.high[:, column]
+        missing = np.isnan(low)
+        # A missing value is as far from all others as the largest from the smallest.
+        nearest_yet = np.where(missing, 0.0 if cells[-1] else 1.0, np.inf)
+        scale = self._shown.scale[column]
+        if field.feature is not None and field.feature.kind is FeatureKind.CATEGORICAL:
+            codes = np.flatnonzero(cells[:-1])
+            anything = np.isinf(low)
+            same = np.isin(low, codes) | (anything & (len(codes) > 0))
+            return np.where(missing, nearest_yet, np.where(same, 0.0, 1.0))
+        for one in _ranges(field, cells):
+            if one.missing:
+                nearest_yet = np.fmin(nearest_yet, 1.0)
+            else:
+                away = np.fmax(np.fmax(one.above - high, low - one.at_most), 0.0) / scale
+                # On the lower end, which is not part of the range, it is just outside.
+                away = np.where((away == 0) & (high <= one.above), 1e-12, away)
+                nearest_yet = np.where(missing, nearest_yet, np.fmin(nearest_yet, away))
+        return nearest_yet
+
+    def _restricted(self, box: Boxes) -> Iterator[tuple[Field, BoolArray]]:
+        """The fields of which the box does not have all cells."""
+        for field in self._grid.fields:
+            cells = field.cells_of(box[:, np.newaxis])[0]
+            if not cells.all():
+                yield field, cells
+
+    def point(self, box: Boxes, row: int | None) -> Point | None:
+        """A state in the box, near to a row; None if there is none.
+
+        Raises:
+            Unsettled: It could not be found out.
+        """
+        values = [self._shown_value(column, row) for column in range(len(self._features))]
+        before: HistoryCell | None = None
+        for field in self._grid.fields:
+            cells = field.cells_of(box[:, np.newaxis])[0]
+            if field.quantity is None:
+                before = self._before(field, cells, row)
+            elif isinstance(field.quantity, str):
+                column = self._place[field.quantity]
+                values[column] = self._value(field, cells, column, values[column])
+        if not self._fits(box, values):
+            moved = self._moved(box, values)
+            if moved is None:
+                return None
+            values = moved
+        return Point(tuple(values), before)
+
+    def _shown_value(self, column: int, row: int | None) -> float:
+        if row is None:
+            return 0.0
+        low, high = float(self._shown.low[row, column]), float(self._shown.high[row, column])
+        if math.isinf(low):
+            return 0.0
+        return low if low == high or math.isnan(low) else (low + high) / 2
+
+    def _before(self, field: Field, cells: BoolArray, row: int | None) -> HistoryCell:
+        allowed = [field.histories[place] for place in np.flatnonzero(cells)]
+        table = self._shown.table
+        if row is not None and table is not None:
+            code = int(table.previous[row])
+            previous = table.actions[code] if code >= 0 else None
+            allowed.sort(key=lambda one: one.previous != previous)
+        # What an action is called says more than that it is another one.
+        return min(allowed, key=lambda one: ANOTHER_ACTION in one.taken)
+
+    def _value(self, field: Field, cells: BoolArray, column: int, value: float) -> float:
+        """The value in some cells that is nearest to another one."""
+        if cells[field.cell(value)] and self._is_value(field, value):
+            return value
+        if field.feature is not None and field.feature.kind is FeatureKind.CATEGORICAL:
+            codes = np.flatnonzero(cells)
+            return float(field.ends[codes[0]])
+        best, least = math.nan, math.inf
+        for one in _ranges(field, cells):
+            if not one.missing:
+                inside = _inside(one, value, float(self._shown.scale[column]))
+                away = abs(inside - value) if not math.isnan(value) else 0.0
+                if away < least:
+                    best, least = inside, away
+        return best
+
+    def _is_value(self, field: Field, value: float) -> bool:
+        kind = field.feature.kind if field.feature is not None else FeatureKind.NUMERIC
+        return kind is not FeatureKind.CATEGORICAL or math.isnan(value) or value in field.ends
+
+    def _fits(self, box: Boxes, values: Sequence[float]) -> bool:
+        for field in self._grid.differences:
+            cells = field.cells_of(box[:, np.newaxis])[0]
+            if not cells[field.cell(self._difference(field, values))]:
+                return False
+        return True
+
+    def _difference(self, field: Field, values: Sequence[float]) -> float:
+        assert isinstance(field.quantity, Difference)
+        minuend = values[self._place[field.quantity.minuend]]
+        subtrahend = values[self._place[field.quantity.subtrahend]]
+        return minuend - subtrahend
+
+    def _moved(self, box: Boxes, values: list[float]) -> list[float] | None:
+        """The values with some moved so that differences fit the box; None if that cannot be.
+
+        Raises:
+            Unsettled: It could not be found out.
+        """
+        restricted = [
+            (field, cells)
+            for field, cells in self._restricted(box)
+            if isinstance(field.quantity, Difference)
+        ]
+        names = dict.fromkeys(name for field, _ in restricted for name in _names(field))
+        choices = [_choices(self._grid.field(name), box) for name in names]
+        choices += [_ranges(field, cells) for field, cells in restricted]
+        if math.prod(map(len, choices)) > _MOST_COMBINATIONS:
+            raise Unsettled
+        settled = True
+        for chosen in product(*choices):
+            ranges = dict(zip(names, chosen, strict=False))
+            between = chosen[len(names) :]
+            fields = [field for field, _ in restricted]
+            solutions, possible = _solved(ranges, list(zip(fields, between, strict=True)))
+            for found in solutions:
+                moved = list(values)
+                for name, value in found.items():
+                    moved[self._place[name]] = value
+                if self._fits(box, moved) and self._in_cells(box, moved, names):
+                    return moved
+            settled = settled and not possible
+        if not settled:
+            raise Unsettled
+        return None
+
+    def _in_cells(self, box: Boxes, values: Sequence[float], names: Iterable[str]) -> bool:
+        for name in names:
+            field = self._grid.field(name)
+            assert field is not None
+            cells = field.cells_of(box[:, np.newaxis])[0]
+            if not cells[field.cell(values[self._place[name]])]:
+                return False
+        return True
+
+
+def _solved(
+    ranges: dict[str, _Range], differences: Sequence[tuple[Field, _Range]]
+) -> tuple[list[dict[str, float]], bool]:
+    """Numbers that should lie in all ranges, and whether there can be any.
+
+    Rounding may have moved them a little, so the first ones lie amid all that are possible.
+    """
+    known = {name: its for name, its in ranges.items() if not its.missing}
+    exact: list[_Edge] = []
+    loose: list[_Edge] = []
+    for field, its in differences:
+        minuend, subtrahend = _names(field)
+        both = minuend in known and subtrahend in known
+        if its.missing == both:
+            return [], False
+        if not its.missing:
+            narrow, wide = _difference_edges(minuend, subtrahend, its)
+            exact += narrow
+            loose += wide
+    bounds = [edge for name, its in known.items() for edge in _bounds(name, its)]
+    highest = _potentials([*known], [*bounds, *exact])
+    if highest is None:
+        return [], _potentials([*known], [*bounds, *loose]) is not None
+    turned = _potentials([*known], [(y, x, most) for x, y, most in (*bounds, *exact)])
+    assert turned is not None
+    lowest = {name: -value for name, value in turned.items()}
+    amid = {name: (value + lowest[name]) / 2 for name, value in highest.items()}
+    missing = {name: math.nan for name, its in ranges.items() if its.missing}
+    return [
+        missing | {name: float(value) for name, value in one.items()}
+        for one in (amid, highest, lowest)
+    ], True
+
+
+def _names(field: Field) -> tuple[str, str]:
+    assert isinstance(field.quantity, Difference)
+    return field.quantity.minuend, field.quantity.subtrahend
+
+
+def _choices(field: Field | None, box: Boxes) -> list[_Range]:
+    assert field is not None
+    return _ranges(field, field.cells_of(box[:, np.newaxis])[0])
+
+
+def _ranges(field: Field, cells: BoolArray) -> list[_Range]:
+    """The values of some cells, neighbouring ones together; the missing value comes last."""
+    numbers = np.concatenate([[False], cells[:-1], [False]])
+    borders = np.flatnonzero(numbers[1:] != numbers[:-1])
+    ranges = [
+        _Range(field.below(int(first)), float(field.ends[last - 1]))
+        for first, last in zip(borders[::2], borders[1::2], strict=True)
+    ]
+    return [*ranges, _Range(math.nan, math.nan)] if cells[-1] else ranges
+
+
+def _inside(one: _Range, value: float, scale: float) -> float:
+    """A number in a range that is near to a value, and reads well."""
+    low, high = max(one.above, -LARGEST), one.at_most
+    width = high - low
+    step = min(_INSIDE * scale, width / 2) if math.isfinite(width) else _INSIDE * scale
+    if math.isnan(value):
+        value = low + step if one.above > -math.inf else high - step
+    wanted = min(max(value, low + step), high - step if high < LARGEST else high)
+    for digits in range(1, 17):
+        rounded = float(f"{wanted:.{digits}g}")
+        if one.above < rounded <= high and abs(rounded - wanted) <= step / 2:
+            return rounded
+    return wanted if one.above < wanted <= high else high
+
+
+#: ``x - y <= c`` as (x, y, c).
+_Edge: TypeAlias = tuple[str, str, Fraction]
+#: The point that bounds of single features are counted from; no feature is called that.
+_ZERO: Final = "\0"
+
+
+def _bounds(name: str, its: _Range) -> Iterator[_Edge]:
+    if its.at_most < LARGEST:
+        yield name, _ZERO, Fraction(its.at_most)
+    if its.above > -math.inf:
+        yield _ZERO, name, -Fraction(math.nextafter(its.above, math.inf))
+
+
+def _difference_edges(
+    minuend: str, subtrahend: str, its: _Range
+) -> tuple[list[_Edge], list[_Edge]]:
+    """The bounds of a difference: within its range, and such that it may be rounded into it."""
+    exact: list[_Edge] = []
+    loose: list[_Edge] = []
+    if its.at_most < LARGEST:
+        after = math.nextafter(its.at_most, math.inf)
+        exact.append((minuend, subtrahend, Fraction(its.at_most)))
+        loose.append((minuend, subtrahend, (Fraction(its.at_most) + Fraction(after)) / 2))
+    if its.above > -math.inf:
+        least = math.nextafter(its.above, math.inf)
+        exact.append((subtrahend, minuend, -Fraction(least)))
+        loose.append((subtrahend, minuend, -(Fraction(its.above) + Fraction(least)) / 2))
+    return exact, loose
+
+
+def _potentials(names: Sequence[str], edges: Sequence[_Edge]) -> dict[str, Fraction] | None:
+    """Numbers with ``x - y <= c`` for all edges (Bellman and Ford); None if there are none."""
+    value = dict.fromkeys((*names, _ZERO), Fraction(0))
+    for _ in range(len(value)):
+        changed = False
+        for x, y, most in edges:
+            if value[x] > value[y] + most:
+                value[x] = value[y] + most
+                changed = True
+        if not changed:
+            return {name: value[name] - value[_ZERO] for name in names}
+    return None
