@@ -216,7 +216,7 @@ def _flip(
     feature: str | None,
 ) -> Flip | None:
     try:
-        near = nearest(boxes, grid, learned.features, origin)
+        near = nearest(boxes, grid, learned.features, origin, feature)
     except Unsettled:
         return None
     if near is None:

@@ -62,7 +62,13 @@ class Unsettled(Exception):  # noqa: N818 - an answer rather than an error
     """Whether a box has a state could not be found out."""
 
 
-def nearest(boxes: Boxes, grid: Grid, features: Sequence[Feature], shown: Reference) -> Near | None:
+def nearest(
+    boxes: Boxes,
+    grid: Grid,
+    features: Sequence[Feature],
+    shown: Reference,
+    movable: str | None = None,
+) -> Near | None:
     """The state in some boxes that lies nearest to what was shown.
 
     Args:
@@ -70,6 +76,7 @@ def nearest(boxes: Boxes, grid: Grid, features: Sequence[Feature], shown: Refere
         grid: Theirs.
         features: All features of the tree.
         shown: What was shown; without rows, any state is as near as any other one.
+        movable: If given, the only feature whose value may differ from what was shown.
 
     Returns:
         None where the boxes have no state.
@@ -77,7 +84,7 @@ def nearest(boxes: Boxes, grid: Grid, features: Sequence[Feature], shown: Refere
     Raises:
         Unsettled: Some boxes could not be settled, and no other one has a state.
     """
-    finder = _Finder(grid, features, shown)
+    finder = _Finder(grid, features, shown, movable)
     unsettled = False
     for place, row, distance in finder.candidates(boxes):
         try:
@@ -93,7 +100,10 @@ def nearest(boxes: Boxes, grid: Grid, features: Sequence[Feature], shown: Refere
 
 
 class _Finder:
-    def __init__(self, grid: Grid, features: Sequence[Feature], shown: Reference) -> None:
+    def __init__(
+        self, grid: Grid, features: Sequence[Feature], shown: Reference, movable: str | None
+    ) -> None:
+        self._movable = movable
         self._grid = grid
         self._features = features
         self._shown = shown
@@ -237,7 +247,12 @@ class _Finder:
             if isinstance(field.quantity, Difference)
         ]
         names = dict.fromkeys(name for field, _ in restricted for name in _names(field))
-        choices = [_choices(self._grid.field(name), box) for name in names]
+        choices = [
+            _choices(self._grid.field(name), box)
+            if self._movable in (None, name)
+            else [_only(values[self._place[name]])]
+            for name in names
+        ]
         choices += [_ranges(field, cells) for field, cells in restricted]
         if math.prod(map(len, choices)) > _MOST_COMBINATIONS:
             raise Unsettled
@@ -310,6 +325,11 @@ def _names(field: Field) -> tuple[str, str]:
 def _choices(field: Field | None, box: Boxes) -> list[_Range]:
     assert field is not None
     return _ranges(field, field.cells_of(box[:, np.newaxis])[0])
+
+
+def _only(value: float) -> _Range:
+    """The range of nothing but one value."""
+    return _Range(math.nextafter(value, -math.inf), value)
 
 
 def _ranges(field: Field, cells: BoolArray) -> list[_Range]:
