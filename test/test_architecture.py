@@ -79,7 +79,7 @@ HOMES: Final = {
     "rosbags": ("rebt_ros.storage", "rebt_ros.storage.*"),
     "scipy": ("rebt_ros.study.edit_distance.program", "rebt_ros.study.edit_distance.relaxation"),
     "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
-    "yaml": ("rebt_ros.verification.rules_file",),
+    "yaml": ("rebt_ros.robot_file.*", "rebt_ros.verification.rules_file"),
 }
 
 #: Run code that comes from data, or read formats that do.
