@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pytest
 import strategies as some
+from test_pipeline import there_and_back
 
 from rebt_ros.beyond_the_paper import single_loops
 from rebt_ros.decision_tree import training
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.training import train
-from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.errors import OptionError
 from rebt_ros.learning import suggesting
 from rebt_ros.learning.options import LearnOptions
+from rebt_ros.learning.pipeline import learn_channels
 from rebt_ros.paper import lat_trees
 
 DEFAULT, PAPER = LearnOptions(), LearnOptions.paper()
@@ -74,3 +77,14 @@ def test_trees_of_any_size_are_minimized_for_the_paper_alone(
     assert notes[0][0].startswith("no PSA nodes and LAT trees are suggested")
     assert not any("no PSA nodes" in note for note in notes[1])
     assert asked.least_support == [0]
+
+
+def test_with_one_channel_ids_to_attach_have_no_channel_in_front() -> None:
+    table = tabulate([there_and_back("one")])[0]
+    [offering] = learn_channels([table])
+    first = offering.learned.suggestions[0].id
+    assert "/" not in first
+    [attached] = learn_channels([table], replace(DEFAULT, attach=(first,)))
+    assert [one.id for one in attached.learned.suggestions if one.attached] == [first]
+    with pytest.raises(OptionError, match=f"^there is no suggestion '{table.channel}/{first}'"):
+        learn_channels([table], replace(DEFAULT, attach=(f"{table.channel}/{first}",)))
