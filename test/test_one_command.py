@@ -96,3 +96,24 @@ def test_of_psa_actions_made_a_parallel_the_best_supported_is_done(kind: RowKind
     assert own_history_choices(tree, table).tolist() == [0, 3]
     assert commanded(tree, table, kind) == [0, 3]
     assert teacher_forced_choices(group, table).tolist() == [0, NO_ACTION]
+
+
+def test_a_parallel_of_one_channel_is_one_policy() -> None:
+    rules = nodes.Parallel((GO, TURN))
+    arm = nodes.Action("lift", "arm")
+    assert nodes.policies(rules) == {some.CHANNEL: rules}
+    assert nodes.policies(nodes.Parallel((GO, arm))) == {some.CHANNEL: GO, "arm": arm}
+
+
+def test_what_remembers_a_step_or_takes_several_actions_is_not_reactive() -> None:
+    near = nodes.Condition(some.at_most("distance", 0.3))
+    for tree, reactive in (
+        (nodes.Selector((nodes.Sequence((near, GO)), nodes.Parallel((TURN, WAIT)))), True),
+        (nodes.Sequence((near, GO), memory=True), False),
+        (nodes.Selector((GO, TURN), memory=True), False),
+        (nodes.Repeater((near, GO)), False),
+        (nodes.Sequence((GO, TURN)), False),
+        (nodes.Inverter(GO), False),
+        (nodes.Parallel((nodes.Sequence((near, GO)), TURN)), False),
+    ):
+        assert nodes.is_reactive(tree) is reactive
