@@ -1,0 +1,258 @@
+"""Guards that make a tree keep its rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.prediction import States, choose, history_columns
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Literal
+from rebt_ros.verification.errors import RuleError
+from rebt_ros.verification.formulas import AllOf, AnyOf, Formula, negated
+from rebt_ros.verification.grid import Boxes, Grid
+from rebt_ros.verification.proof import (
+    Answer,
+    ChannelProof,
+    Verdict,
+    breaking,
+    check,
+    grid_of,
+    policies_of,
+    verdicts,
+)
+from rebt_ros.verification.rules import Demand
+from rebt_ros.verification.sweep import Results, Sweep, Ticks, remembers, sweep
+from rebt_ros.verification.verdict_text import what_breaks
+
+#: How often rules are gone through: a guard may let another branch act.
+_ROUNDS: Final = 4
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Repaired:
+    """A tree that was mended."""
+
+    learned: LearnedTree
+    proofs: tuple[ChannelProof, ...]
+    verdicts: tuple[Verdict, ...]
+    """Of the mended tree: all rules are proven."""
+    added: int
+    """How many nodes it has more."""
+    changed: int
+    """In how many rows that were shown it does something else."""
+    rows: int
+    """How many rows that were shown are at hand."""
+
+    def __str__(self) -> str:
+        added = f"{self.added:+d} node{'' if abs(self.added) == 1 else 's'}"
+        return f"{added}, {self.changed} of {self.rows} rows changed" if self.rows else added
+
+
+def repair(
+    learned: LearnedTree,
+    demands: Sequence[Demand],
+    tables: Sequence[DemonstrationTable] = (),
+    results: Results = Results.AT_ONCE,
+) -> Repaired:
+    """The tree with the smallest guards in front of actions that break rules.
+
+    Where an action is forbidden, a guard stands before it in each branch that breaks the rule, so
+    that the branches after it act there.  Where it is demanded, it has a branch before all others.
+
+    Args:
+        learned: The tree.
+        demands: Its rules, which do not contradict each other.
+        tables: What was shown, with the features of the tree.
+        results: How actions end.
+
+    Raises:
+        RuleError: Guards do not make the tree keep its rules.
+    """
+    mended = learned
+    for _ in range(_ROUNDS):
+        proofs = check(mended, demands, tables, results)
+        found = verdicts(proofs, demands)
+        failed = [one.demand for one in found if one.answer is not Answer.PROVEN]
+        if not failed:
+            return Repaired(
+                mended,
+                proofs,
+                found,
+                nodes.size(mended.tree) - nodes.size(learned.tree),
+                sum(_changed(learned, mended, table) for table in tables),
+                sum(map(len, tables)),
+            )
+        for demand in failed:
+            mended = _guarded(mended, demand, results)
+    raise RuleError(f"the tree cannot be mended by guards: {what_breaks(mended, proofs, found)}.")
+
+
+def _changed(before: LearnedTree, after: LearnedTree, table: DemonstrationTable) -> int:
+    chosen = []
+    columns = history_columns(table.actions, table.previous, table.last)
+    states = States(table.features, table.states, columns)
+    actions = tuple(nodes.Action(label, table.channel) for label in table.actions)
+    for learned in (before, after):
+        policy = policies_of(learned).get(table.channel)
+        if policy is None:
+            return 0
+        chosen.append(choose(policy, actions, states))
+    return int(np.count_nonzero(chosen[0] != chosen[1]))
+
+
+def _guarded(learned: LearnedTree, demand: Demand, results: Results) -> LearnedTree:
+    policies = policies_of(learned)
+    channel = demand.action.channel
+    policy = policies.get(channel)
+    forbidden = demand.forbids
+    if forbidden is None:
+        first = _sequence(demand.when, demand.action)
+        others = () if policy is None else _branches(policy)
+        return _with_policy(learned, channel, nodes.Selector((first, *others)))
+    if policy is None:
+        return learned
+    mended = _Guarding(learned, demand, policy, results).tree()
+    if mended is None:
+        raise RuleError(
+            f"the tree cannot be mended: nothing is left of it without what breaks '{demand.rule}'."
+        )
+    return _with_policy(learned, channel, mended)
+
+
+def _branches(policy: nodes.Node) -> tuple[nodes.Node, ...]:
+    reactive = isinstance(policy, nodes.Selector) and not policy.memory
+    return policy.children if reactive and isinstance(policy, nodes.Selector) else (policy,)
+
+
+def _with_policy(learned: LearnedTree, channel: str, policy: nodes.Node) -> LearnedTree:
+    """The tree with another one for a channel, as it is executed."""
+    policies = policies_of(learned) | {channel: policy}
+    trees = tuple(policies.values())
+    return replace(learned, tree=trees[0] if len(trees) == 1 else nodes.Parallel(trees))
+
+
+def _sequence(when: Formula, action: nodes.Action) -> nodes.Node:
+    return nodes.Sequence((*_tests(when), action)) if _tests(when) else action
+
+
+def _tests(formula: Formula) -> tuple[nodes.Node, ...]:
+    """Nodes that all succeed where a formula holds."""
+    if isinstance(formula, AllOf):
+        return tuple(test for part in formula.parts for test in _tests(part))
+    return (_test(formula),)
+
+
+def _test(formula: Formula) -> nodes.Node:
+    """A node that succeeds where a formula holds."""
+    match formula:
+        case Literal():
+            return nodes.Condition(formula)
+        case AllOf():
+            return nodes.Sequence(_tests(formula))
+        case AnyOf(parts=parts):
+            return nodes.Selector(tuple(map(_test, _flat(parts))))
+
+
+def _flat(parts: Iterable[Formula]) -> list[Formula]:
+    return [
+        inner
+        for part in parts
+        for inner in (_flat(part.parts) if isinstance(part, AnyOf) else [part])
+    ]
+
+
+class _Guarding:
+    """Guards for one rule that forbids an action.
+
+    Args:
+        learned: The tree.
+        demand: The rule.
+        policy: The tree of the rule's channel.
+        results: How actions end.
+    """
+
+    def __init__(
+        self, learned: LearnedTree, demand: Demand, policy: nodes.Node, results: Results
+    ) -> None:
+        assert demand.forbids is not None
+        self._policy = policy
+        self._action = demand.action
+        self._allowed = negated(demand.forbids)
+        self._grid = grid_of(learned, [policy], [self._allowed])
+        ticks = Ticks.ANY if remembers(policy, results) else Ticks.FIRST
+        self._done: Sweep = sweep(policy, self._grid, results, ticks)
+        broken = breaking(demand, self._grid, self._done)
+        self._broken = _leaves_in(self._done, broken, self._grid, demand.forbids)
+        self._leaf = 0
+
+    def tree(self) -> nodes.Node | None:
+        """The policy with guards; None where nothing would be left of it."""
+        self._leaf = 0
+        mended = self._mended(self._policy, inserting=False)
+        return mended[0] if mended else None
+
+    def _mended(self, node: nodes.Node, *, inserting: bool) -> tuple[nodes.Node, ...]:
+        """The node, or what stands in its place among the children of its parent.
+
+        Args:
+            node: It.
+            inserting: Whether its parent is a Sequence that asks all conditions at every tick.
+        """
+        if isinstance(node, nodes.Action):
+            leaf = self._leaf
+            self._leaf += 1
+            if node != self._action or leaf not in self._broken:
+                return (node,)
+            here = self._done.boxes[:, self._done.commanding == leaf]
+            if not self._grid.within(here, self._allowed).shape[1]:
+                # It acts nowhere but where it must not.
+                return ()
+            guard = _tests(_needed(self._allowed, here, self._grid))
+            return (*guard, node) if inserting else (nodes.Sequence((*guard, node)),)
+        open_to_guards = isinstance(node, nodes.Sequence) and not node.memory
+        families = [self._mended(child, inserting=open_to_guards) for child in nodes.children(node)]
+        if not all(families) and not isinstance(node, nodes.Selector | nodes.ParallelSelector):
+            # What is left out fails, and so does what needs it; only what was asked is asked still.
+            return () if nodes.children(node) else (node,)
+        family = tuple(mended for one in families for mended in one)
+        if not family:
+            return (node,) if not nodes.children(node) else ()
+        return (nodes.with_children(node, family),)
+
+
+def _leaves_in(done: Sweep, broken: Boxes, grid: Grid, forbidden: Formula) -> frozenset[int]:
+    """The leaves that act in a region."""
+    if not broken.shape[1]:
+        return frozenset()
+    leaves = set(done.commanding.tolist()) - {-1}
+    return frozenset(
+        leaf
+        for leaf in leaves
+        if grid.within(done.boxes[:, done.commanding == leaf], forbidden).shape[1]
+    )
+
+
+def _needed(formula: Formula, here: Boxes, grid: Grid) -> Formula:
+    """A smaller formula that is the same in some boxes."""
+    if isinstance(formula, Literal):
+        return formula
+    parts = list(formula.parts)
+    for part in list(parts):
+        others = [one for one in parts if one is not part]
+        if isinstance(formula, AllOf):
+            # What holds anyway need not be asked.
+            redundant = not grid.within(here, AllOf((*others, negated(part)))).shape[1]
+        else:
+            redundant = not grid.within(here, AllOf((part, *map(negated, others)))).shape[1]
+        if redundant and others:
+            parts = others
+    smaller = tuple(_needed(part, here, grid) for part in parts)
+    if len(smaller) == 1:
+        return smaller[0]
+    return AllOf(smaller) if isinstance(formula, AllOf) else AnyOf(smaller)
