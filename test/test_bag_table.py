@@ -9,11 +9,13 @@ from __future__ import annotations
 import re
 import shutil
 import sqlite3
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Final
 
+import lz4.frame
 import mcap_files as mcap
 import pytest
 from fuzz import corpus
@@ -32,6 +34,17 @@ COUNT: Final = 60
 MESSAGES: Final = 2 * COUNT
 LABELS: Final = ("go", "turn", "wait")
 RECORDED: Final = [((number / 3, float(-number)), LABELS[number % 3]) for number in range(COUNT)]
+
+
+@dataclass(frozen=True)
+class Content:
+    """What is in a bag."""
+
+    messages: tuple[mcap.Message, ...] = tuple(mcap.demonstration(COUNT))
+    channels: tuple[mcap.Channel, ...] = mcap.CHANNELS
+
+
+DEMONSTRATION: Final = Content()
 
 # --- readers: each makes a bag in a directory ---------------------------------------------------
 
@@ -55,6 +68,7 @@ def _metadata(bag: Path, storage: str) -> Path:
 
 def _mcap(
     bag: Path,
+    content: Content = DEMONSTRATION,
     *,
     per_chunk: int | None = 20,
     compression: Compression = Compression.NONE,
@@ -64,7 +78,8 @@ def _mcap(
 ) -> Path:
     mcap.write(
         bag / "bag_0.mcap",
-        mcap.demonstration(COUNT),
+        content.messages,
+        content.channels,
         per_chunk=per_chunk,
         compression=compression,
         index=index,
@@ -74,23 +89,30 @@ def _mcap(
     return _metadata(bag, "mcap")
 
 
-def _split_mcap(bag: Path) -> Path:
-    messages = mcap.demonstration(COUNT)
-    mcap.write(bag / "bag_0.mcap", messages[:COUNT])
-    mcap.write(bag / "bag_1.mcap", messages[COUNT:])
+def _split_mcap(bag: Path, content: Content = DEMONSTRATION) -> Path:
+    mcap.write(bag / "bag_0.mcap", content.messages[:COUNT], content.channels)
+    mcap.write(bag / "bag_1.mcap", content.messages[COUNT:], content.channels)
     return _metadata(bag, "mcap")
 
 
-def _packed_mcap(bag: Path) -> Path:
-    _mcap(bag)
-    (bag / "bag_0.mcap.zstd").write_bytes(
-        mcap.packing._zstd().compress((bag / "bag_0.mcap").read_bytes())
-    )
-    (bag / "bag_0.mcap").unlink()
+def _packed(
+    bag: Path,
+    content: Content = DEMONSTRATION,
+    *,
+    make: Callable[[Path, Content], Path],
+    suffix: str,
+) -> Path:
+    make(bag, content)
+    (file,) = _files(bag)
+    pack = lz4.frame.compress if suffix == ".lz4" else mcap.packing._zstd().compress
+    file.with_name(f"{file.name}{suffix}").write_bytes(pack(file.read_bytes()))
+    file.unlink()
     return _metadata(bag, "mcap")
 
 
-def _database(file: Path, messages: list[mcap.Message]) -> sqlite3.Connection:
+def _database(
+    file: Path, messages: Sequence[mcap.Message], channels: Sequence[mcap.Channel] = mcap.CHANNELS
+) -> sqlite3.Connection:
     """A file as rosbag2 makes it, with pages so small that there are many."""
     file.parent.mkdir(parents=True, exist_ok=True)
     connection = sqlite3.connect(file, isolation_level=None)
@@ -105,14 +127,14 @@ def _database(file: Path, messages: list[mcap.Message]) -> sqlite3.Connection:
     ):
         connection.execute(statement)
     connection.executemany(
-        "INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')",
-        [(number + 1, one.topic, one.kind) for number, one in enumerate(mcap.CHANNELS)],
+        "INSERT INTO topics VALUES (?, ?, ?, ?, '')",
+        [(number + 1, one.topic, one.kind, one.encoding) for number, one in enumerate(channels)],
     )
     _insert(connection, messages)
     return connection
 
 
-def _insert(connection: sqlite3.Connection, messages: list[mcap.Message]) -> None:
+def _insert(connection: sqlite3.Connection, messages: Sequence[mcap.Message]) -> None:
     connection.execute("BEGIN")
     connection.executemany(
         "INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)",
@@ -121,23 +143,22 @@ def _insert(connection: sqlite3.Connection, messages: list[mcap.Message]) -> Non
     connection.execute("COMMIT")
 
 
-def _sqlite(bag: Path) -> Path:
-    _database(bag / "bag_0.db3", mcap.demonstration(COUNT)).close()
+def _sqlite(bag: Path, content: Content = DEMONSTRATION) -> Path:
+    _database(bag / "bag_0.db3", content.messages, content.channels).close()
     return _metadata(bag, "sqlite3")
 
 
-def _split_sqlite(bag: Path) -> Path:
-    messages = mcap.demonstration(COUNT)
-    _database(bag / "bag_0.db3", messages[:COUNT]).close()
-    _database(bag / "bag_1.db3", messages[COUNT:]).close()
+def _split_sqlite(bag: Path, content: Content = DEMONSTRATION) -> Path:
+    _database(bag / "bag_0.db3", content.messages[:COUNT], content.channels).close()
+    _database(bag / "bag_1.db3", content.messages[COUNT:], content.channels).close()
     return _metadata(bag, "sqlite3")
 
 
-def _sqlite_with_log(bag: Path) -> Path:
+def _sqlite_with_log(bag: Path, content: Content = DEMONSTRATION) -> Path:
     """The second half of the messages is in the write-ahead log, as a killed recorder leaves it."""
-    messages = mcap.demonstration(COUNT)
+    messages = content.messages
     live = bag.with_name(f"{bag.name}.live") / "bag_0.db3"
-    connection = _database(live, messages[:COUNT])
+    connection = _database(live, messages[:COUNT], content.channels)
     connection.execute("PRAGMA journal_mode = WAL")
     _insert(connection, messages[COUNT:])
     bag.mkdir()
@@ -150,20 +171,13 @@ def _sqlite_with_log(bag: Path) -> Path:
     return bag
 
 
-def _packed_sqlite(bag: Path) -> Path:
-    _sqlite(bag)
-    (bag / "bag_0.db3.zstd").write_bytes(
-        mcap.packing._zstd().compress((bag / "bag_0.db3").read_bytes())
-    )
-    (bag / "bag_0.db3").unlink()
-    return _metadata(bag, "sqlite3")
-
-
-def _by_rosbags(bag: Path, *, storage: StoragePlugin, mode: CompressionMode | None) -> Path:
+def _by_rosbags(
+    bag: Path, _: Content = DEMONSTRATION, *, storage: StoragePlugin, mode: CompressionMode | None
+) -> Path:
     return corpus.bag(bag, storage, mode, COUNT)
 
 
-def _recording(directory: Path) -> Path:
+def _recording(directory: Path, _: Content = DEMONSTRATION) -> Path:
     features = (Feature("a", topic="/state", index=0), Feature("b", topic="/state", index=1))
     with RecordingWriter(directory, features, ("/action",)) as writer:
         for number, (values, label) in enumerate(RECORDED):
@@ -171,7 +185,7 @@ def _recording(directory: Path) -> Path:
     return directory
 
 
-READERS: Final[Mapping[str, Callable[[Path], Path]]] = {
+READERS: Final[Mapping[str, Callable[..., Path]]] = {
     "mcap": _mcap,
     "mcap without chunks": partial(_mcap, per_chunk=None),
     "mcap without indexes": partial(_mcap, index=False),
@@ -181,7 +195,8 @@ READERS: Final[Mapping[str, Callable[[Path], Path]]] = {
     "mcap zstd": partial(_mcap, compression=Compression.ZSTD),
     "mcap lz4": partial(_mcap, compression=Compression.LZ4),
     "split mcap": _split_mcap,
-    "packed mcap": _packed_mcap,
+    "packed mcap": partial(_packed, make=_mcap, suffix=".zstd"),
+    "mcap packed by lz4": partial(_packed, make=_mcap, suffix=".lz4"),
     "mcap of rosbags": partial(_by_rosbags, storage=StoragePlugin.MCAP, mode=None),
     "mcap of packed messages": partial(
         _by_rosbags, storage=StoragePlugin.MCAP, mode=CompressionMode.MESSAGE
@@ -189,7 +204,7 @@ READERS: Final[Mapping[str, Callable[[Path], Path]]] = {
     "sqlite": _sqlite,
     "sqlite with a log": _sqlite_with_log,
     "split sqlite": _split_sqlite,
-    "packed sqlite": _packed_sqlite,
+    "packed sqlite": partial(_packed, make=_sqlite, suffix=".zstd"),
     "sqlite of packed messages": partial(
         _by_rosbags, storage=StoragePlugin.SQLITE3, mode=CompressionMode.MESSAGE
     ),
@@ -345,3 +360,74 @@ def test_nothing_is_lost_in_silence(
             assert loaded.notes == ()
     if way.startswith("counts too") and metadata:
         assert any(f"and {MESSAGES} were found" in note for note in loaded.notes)
+
+
+# --- messages that are no part of a demonstration -------------------------------------------------
+
+_WHOLE: Final = DEMONSTRATION.messages
+
+
+def _with(message: mcap.Message, *channels: mcap.Channel) -> Content:
+    """The demonstration with the same message in three places, and with more channels."""
+    messages = list(_WHOLE)
+    for place in (5, 30, 91):
+        messages.insert(place, replace(message, stamp=messages[place].stamp))
+    return Content(tuple(messages), (*mcap.CHANNELS, *channels))
+
+
+#: What is in a bag besides, what notes say of it, and how many of its messages are accounted for.
+CONTENTS: Final[Mapping[str, tuple[Content, str, int]]] = {
+    "states that cannot be decoded": (
+        _with(mcap.Message(0, 0, b"\0\1\0\0\xff")),
+        "left out: 3 unusable messages; the first: .*cannot be decoded",
+        3,
+    ),
+    "actions without data": (
+        _with(mcap.Message(1, 0, b"")),
+        "left out: 3 unusable messages; the first: .*cannot be decoded",
+        3,
+    ),
+    "another type on the topic": (
+        _with(mcap.Message(2, 0, b"\0\1\0\0"), mcap.Channel("/state", "geometry_msgs/msg/Twist")),
+        "left out: messages on /state of type geometry_msgs/msg/Twist: 3",
+        0,
+    ),
+    "another encoding on the topic": (
+        _with(mcap.Message(2, 0, b"{}"), mcap.Channel("/action", mcap.ACTION, "json")),
+        "left out: json messages on /action: 3",
+        0,
+    ),
+    "another topic": (
+        _with(mcap.Message(2, 0, b"\0\1\0\0"), mcap.Channel("/odom", "a/msg/B")),
+        "",
+        0,
+    ),
+    "topics that are not described": (
+        _with(mcap.Message(76, 0, b"\0\1\0\0")),
+        "left out: messages of topics that .* does not describe: [1-3]",
+        0,
+    ),
+}
+
+
+@pytest.mark.parametrize("content", CONTENTS)
+@pytest.mark.parametrize("reader", [one for one in READERS if " of " not in one])
+def test_what_is_left_out_is_named_and_counted(tmp_path: Path, reader: str, content: str) -> None:
+    if reader == "recording":
+        pytest.skip("has no messages")
+    inside, note, count = CONTENTS[content]
+    bag = READERS[reader](tmp_path / "bag", inside)
+    for metadata in (True, False):
+        if not metadata:
+            (bag / METADATA).unlink()
+        loaded = load([bag], InputOptions(skip_bad=True))
+        assert _rows(loaded) == RECORDED
+        assert not note or any(re.search(note, one) for one in loaded.notes)
+        [account] = loaded.accounts.values()
+        assert account.read == MESSAGES
+        assert sum(account.left_out.values()) == count
+        # Metadata say that there are as many as belong there.
+        expected = MESSAGES if metadata else MESSAGES + count
+        assert account.stated == expected
+        told = any(f"says that it holds {MESSAGES}" in one for one in loaded.notes)
+        assert told == bool(metadata and count)
