@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import lz4.frame
+import mcap_files
 import pytest
 from fuzz import corpus
 from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
@@ -80,8 +81,24 @@ def test_a_file_that_unpacks_to_too_much_is_refused(
     bag = corpus.bag(tmp_path / "bag", storage, CompressionMode.FILE)
     (file,) = bag.glob("*.zstd")
     file.write_bytes(bomb)
-    with refused("could unpack to"):
+    with refused("could unpack to .*, and at most .* are read: .*zstd -d"):
         read_bag(bag)
+
+
+def test_a_file_that_is_unpacked_as_was_advised_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "bag" / "bag_0.mcap"
+    messages = mcap_files.demonstration()
+    camera = mcap_files.Message(2, 3, bytes(300 << 20))
+    channels = (*mcap_files.CHANNELS, mcap_files.Channel("/camera", "sensor_msgs/msg/Image"))
+    mcap_files.write(path, [*messages, camera], channels, per_chunk=None)
+    packed = path.with_name("bag_0.mcap.zstd")
+    packed.write_bytes(zstd.compress(path.read_bytes()))
+    path.unlink()
+    with pytest.raises(InputError, match="unpack it with `zstd -d`"):
+        read_bag(tmp_path / "bag")
+    with zstd.open(packed, "rb") as source, path.open("wb") as target:
+        shutil.copyfileobj(source, target)
+    assert len(read_bag(tmp_path / "bag").demonstration) == 20
 
 
 def packed_chunks(

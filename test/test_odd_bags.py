@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
+import sqlite3
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import mcap_files as mcap
+import numpy as np
 import pytest
 import test_bag_table as table
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_typestore
 
 from rebt_ros.errors import InputError
 from rebt_ros.storage.bag import read_bag
+from rebt_ros.storage.inputs import load
 
 MESSAGES = mcap.demonstration()
 
@@ -171,6 +179,25 @@ def test_what_is_no_bag_is_called_what_it_is(
         read_bag(tmp_path / name)
 
 
+def test_a_bag_of_ros1_is_read_once_it_is_converted_as_was_advised(tmp_path: Path) -> None:
+    path = tmp_path / "old.bag"
+    types = get_typestore(Stores.ROS1_NOETIC)
+    layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+    with Writer(path) as writer:
+        state = writer.add_connection("/state", mcap.STATE, typestore=types)
+        action = writer.add_connection("/action", mcap.ACTION, typestore=types)
+        values = types.types[mcap.STATE](layout=layout, data=np.array([1.0, 2.0]))
+        writer.write(state, 1, types.serialize_ros1(values, mcap.STATE))
+        label = types.types[mcap.ACTION](data="go")
+        writer.write(action, 2, types.serialize_ros1(label, mcap.ACTION))
+    with pytest.raises(InputError, match="rosbags-convert --src FILE --dst DIRECTORY"):
+        load([path])
+    command = Path(sys.executable).with_name("rosbags-convert")
+    arguments = [command, "--src", path, "--dst", tmp_path / "new"]
+    subprocess.run(arguments, check=True, capture_output=True)
+    assert len(read_bag(tmp_path / "new").demonstration) == 1
+
+
 @pytest.mark.parametrize("suffix", [".mcap", ".db3"])
 def test_files_are_told_by_what_is_in_them(tmp_path: Path, suffix: str) -> None:
     for number, reader in enumerate(("mcap", "sqlite")):
@@ -178,6 +205,19 @@ def test_files_are_told_by_what_is_in_them(tmp_path: Path, suffix: str) -> None:
         (file,) = (one for one in bag.iterdir() if one.name != table.METADATA)
         shutil.copyfile(file, tmp_path / f"{number}{suffix}")
         assert len(read_bag(tmp_path / f"{number}{suffix}").demonstration) == table.COUNT
+
+
+def test_names_in_a_database_may_be_no_utf8(tmp_path: Path) -> None:
+    bag = table.READERS["sqlite"](tmp_path / "bag")
+    (bag / table.METADATA).unlink()
+    with contextlib.closing(sqlite3.connect(bag / "bag_0.db3")) as connection:
+        connection.execute("UPDATE topics SET name = CAST(x'2fe4f6' AS TEXT) WHERE id = 1")
+        connection.execute("UPDATE messages SET data = CAST(x'e4f6' AS TEXT) WHERE id = 7")
+        connection.commit()
+    read = read_bag(bag, skip_bad=True)
+    assert [one.topic for one in read.demonstration.features] == ["/��"] * 2
+    assert read.account is not None
+    assert read.account.left_out == {"cannot be used": 1}
 
 
 def test_a_journal_tells_that_pages_may_not_be_linked(tmp_path: Path) -> None:

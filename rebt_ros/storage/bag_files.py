@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import re
-import sqlite3
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -394,7 +393,7 @@ def _explanation(path: Path, err: Exception) -> InputError:
             f"{path} cannot be read without the package {err.name}, which rosbags brings: "
             "install rosbags with pip."
         )
-    if isinstance(err, sqlite3.Error) and err.sqlite_errorcode == sqlite3.SQLITE_INTERRUPT:
+    if sqlite.is_interrupted(err):
         return InputError(
             f"{path} would have SQLite compute more than ten times as long as a recorded bag of "
             "its size, and was interrupted: record it again."

@@ -17,7 +17,7 @@ from typing import BinaryIO, Final
 
 from rebt_ros.errors import InputError
 from rebt_ros.storage.mcap import MAGIC, packed_chunks
-from rebt_ros.storage.packing import LZ4_MAGIC, ZSTD_MAGIC
+from rebt_ros.storage.packing import LZ4_MAGIC, ZSTD_MAGIC, without_packing
 
 #: What a message or chunk may unpack to in any case (bytes): the largest real ones are a
 #: chunk of 4 MB, as rosbag2 makes them, and a point cloud of 1,000,000 points (32 MB).
@@ -53,10 +53,13 @@ def check_bag(path: Path, metadata: str) -> None:
         # A link that is named leads where its user wants.
         _check_file(path.resolve(), path.resolve().parent)
         return
-    for one in sorted(path.iterdir()):
+    inside = sorted(path.iterdir())
+    names = {one.name for one in inside}
+    for one in inside:
         if one.name == metadata:
             _check_place(one, path)
-        elif not one.is_dir():
+        elif not one.is_dir() and without_packing(one.name) not in names - {one.name}:
+            # What is there unpacked as well is not read.
             _check_file(one, path)
 
 
@@ -65,7 +68,13 @@ def expansion(data: bytes) -> int:
     return _zstd_bound(io.BytesIO(data), len(data))
 
 
-def check_expansion(what: str, unpacked: int, size: int, least: int = LARGEST_EXPANSION) -> None:
+def check_expansion(
+    what: str,
+    unpacked: int,
+    size: int,
+    least: int = LARGEST_EXPANSION,
+    advice: str = "record it again without compression",
+) -> None:
     """Refuses data that unpack to too much.
 
     Args:
@@ -73,6 +82,7 @@ def check_expansion(what: str, unpacked: int, size: int, least: int = LARGEST_EX
         unpacked: The most that they can unpack to, in bytes.
         size: Their own size, in bytes.
         least: What they may unpack to in any case, in bytes.
+        advice: What helps.
 
     Raises:
         InputError: It is too much.
@@ -81,13 +91,13 @@ def check_expansion(what: str, unpacked: int, size: int, least: int = LARGEST_EX
     if unpacked > most:
         raise InputError(
             f"{what} has {size} bytes that could unpack to {unpacked}, and at most {most} are "
-            "read: if you trust it, unpack it first (a file with `zstd -d`, chunks with "
-            "`mcap decompress`), or record it again without compression."
+            f"read: {advice}."
         )
 
 
 def _check_file(file: Path, directory: Path) -> None:
     _check_place(file, directory)
+    advice = "record it again without compression"
     with file.open("rb") as opened:
         magic = opened.read(8)
         size = os.fstat(opened.fileno()).st_size
@@ -95,12 +105,14 @@ def _check_file(file: Path, directory: Path) -> None:
         if magic == MAGIC:
             unpacked = _mcap_bound(file, opened)
         elif magic.startswith(ZSTD_MAGIC):
+            advice = "if you trust it, unpack it with `zstd -d`"
             unpacked = _zstd_bound(opened, size)
         elif magic.startswith(LZ4_MAGIC):
+            advice = "if you trust it, unpack it with `lz4 -d`"
             unpacked = _lz4_bound(opened, size)
         else:
             unpacked = 0
-    check_expansion(str(file), unpacked, size, LARGEST_FILE)
+    check_expansion(str(file), unpacked, size, LARGEST_FILE, advice)
 
 
 def _check_place(file: Path, directory: Path) -> None:

@@ -14,6 +14,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
 from typing import Final
@@ -262,13 +263,19 @@ def _number(value: object) -> int:
     return value if isinstance(value, int) else -1
 
 
+def is_interrupted(err: Exception) -> bool:
+    """Whether a file makes SQLite compute too much."""
+    # Errors of Python's own have no code.
+    return getattr(err, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT
+
+
 def _refuse_interrupted(err: sqlite3.DatabaseError) -> None:
     """Passes on that a file makes SQLite compute too much, which is no damage.
 
     Raises:
         sqlite3.DatabaseError: It does.
     """
-    if err.sqlite_errorcode == sqlite3.SQLITE_INTERRUPT:
+    if is_interrupted(err):
         raise err
 
 
@@ -276,6 +283,7 @@ def _connected(path: Path) -> sqlite3.Connection:
     size = path.stat().st_size
     address = quote(os.fsencode(path.absolute()))
     connection = sqlite3.connect(f"file:{address}?mode=ro&immutable=1", uri=True)
+    connection.text_factory = partial(str, encoding="utf-8", errors="replace")
     left = _STEPS + _STEPS_PER_BYTE * size
 
     def too_long() -> bool:
