@@ -6,7 +6,6 @@ import copy
 import json
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -35,7 +34,6 @@ from rebt_ros.behavior_tree.learned_tree import (
 from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import History
-from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import DocumentError
 from rebt_ros.logic.conditions import (
     HasCategory,
@@ -182,122 +180,6 @@ def test_numbers_may_be_written_with_or_without_a_fraction() -> None:
     assert type(loaded.provenance.delta) is float
 
 
-#: As earlier releases wrote them.
-VERSION_2 = """{
- "format": "rebt_ros/behavior_tree",
- "version": 2,
- "features": [
-  {"name": "distance", "kind": "numeric", "topic": "state", "index": 0},
-  {"name": "docked", "kind": "binary", "topic": "state", "index": 1, "lag": 2}
- ],
- "actions": [{"label": "go", "channel": "action"}, {"label": "turn", "channel": "action"}],
- "tree": {
-  "type": "selector",
-  "children": [
-   {
-    "type": "sequence",
-    "children": [
-     {
-      "type": "condition",
-      "test": {"type": "threshold", "feature": "distance", "at_most": 0.30000000000000004},
-      "positive": true
-     },
-     {
-      "type": "condition",
-      "test": {"type": "last_action_is", "action": "go", "deciding": ["turn"]},
-      "positive": false
-     },
-     {"type": "action", "label": "turn", "channel": "action"}
-    ]
-   },
-   {"type": "action", "label": "go", "channel": "action"}
-  ]
- },
- "suggestions": [],
- "provenance": {
-  "demonstrations": 2,
-  "rows": 40,
-  "delta": 0.3,
-  "max_depth": null,
-  "ccp_alpha": 0.01,
-  "root": "selector",
-  "uses_last_action": true,
-  "figures": {
-   "fidelity_mismatches": 0,
-   "teacher_forced_agreement": 0.9,
-   "own_history_agreement": 0.8,
-   "held_out_rows": 10
-  },
-  "channels": [
-   {
-    "channel": "action",
-    "rows": 40,
-    "ccp_alpha": 0.01,
-    "uses_last_action": false,
-    "figures": {
-     "fidelity_mismatches": 0,
-     "teacher_forced_agreement": null,
-     "own_history_agreement": null,
-     "held_out_rows": 0
-    }
-   }
-  ]
- },
- "shown": [{"channel": "action", "leaves": [{"rows": 40, "values": [[0.1, 2.0], null]}]}]
-}"""
-
-
-def of_version_2() -> LearnedTree:
-    go, turn = some.action("go"), some.action("turn")
-    last = ~Literal(LastActionIs("go", ("turn",)))
-    return LearnedTree(
-        (
-            Feature("distance", topic="state", index=0),
-            Feature("docked", FeatureKind.BINARY, topic="state", index=1, lag=2),
-        ),
-        (go, turn),
-        nodes.Selector((some.when(NEAR, last, then=turn), go)),
-        Provenance(
-            2,
-            40,
-            0.3,
-            None,
-            0.01,
-            Root.SELECTOR,
-            History.LAST,
-            Figures(0, 0.9, 0.8, 10, None),
-            (ChannelProvenance("action", 40, 0.01, History.NONE, Figures(0, None, None, 0)),),
-        ),
-        shown=(ShownChannel("action", (ShownLeaf(40, (Span(0.1, 2.0), None)),)),),
-        row_kind=RowKind.EVENT,
-    )
-
-
-def test_a_document_of_version_2_is_read_as_one_of_events_with_lat_or_without() -> None:
-    assert SCHEMA.is_valid(json.loads(VERSION_2))
-    read = loads(VERSION_2)
-    assert read == of_version_2()
-    # What is written now is of this version, and the same tree.
-    again = dumps(read)
-    assert json.loads(again)["version"] == 3
-    assert loads(again) == read
-
-
-def test_a_document_of_version_1_is_read_and_says_nothing_of_what_was_shown() -> None:
-    old = json.loads(VERSION_2)
-    old["version"] = 1
-    del old["shown"]
-    assert SCHEMA.is_valid(old)
-    assert loads(json.dumps(old)) == replace(of_version_2(), shown=())
-
-
-def test_documents_of_earlier_versions_have_nothing_of_later_ones() -> None:
-    old = json.loads(VERSION_2)
-    old["row_kind"] = "sample"
-    assert not SCHEMA.is_valid(old)
-    assert "unknown field 'row_kind'" in refusal(json.dumps(old))
-
-
 # --- the schema and the reader agree ----------------------------------------------------------
 
 #: What the schema cannot say.
@@ -411,9 +293,10 @@ Change = Callable[[dict[str, Any]], object]
         (lambda d: d.update(extra=1), "document has the unknown field 'extra'."),
         (lambda d: d.pop("format"), "does not say that its format is 'rebt_ros/behavior_tree'"),
         (lambda d: d.update(format="bt"), "does not say that its format is"),
-        (lambda d: d.update(version=4), "version 4: this release of rebt_ros reads the versions 1"),
-        (lambda d: d.update(version=1), "unknown field"),
-        (lambda d: d.update(version=2), "unknown field 'row_kind'"),
+        (lambda d: d.update(version=4), "document lacks 'robot'."),
+        (lambda d: d.update(version=5), "version 5: this release of rebt_ros reads the versions 3"),
+        (lambda d: d.update(version=1), "version 1: this release of rebt_ros reads the versions 3"),
+        (lambda d: d.update(version=2), "reads the versions 3 and 4."),
         (lambda d: d.pop("row_kind"), "document lacks 'row_kind'."),
         (
             lambda d: d.update(row_kind="state"),
@@ -421,11 +304,11 @@ Change = Callable[[dict[str, Any]], object]
         ),
         (
             lambda d: d["provenance"].update(uses_last_action=True),
-            "document.provenance must have either 'history' or 'uses_last_action'.",
+            "document.provenance has the unknown field 'uses_last_action'.",
         ),
         (
             lambda d: d["provenance"]["channels"][0].pop("history"),
-            "document.provenance.channels[0] must have either",
+            "document.provenance.channels[0] lacks 'history'.",
         ),
         (
             lambda d: d["provenance"].update(history="lat"),

@@ -122,6 +122,15 @@ def test_a_recording_is_told_by_its_first_line_not_by_its_name(tmp_path):
     assert names(load([path])) == ["mine.txt"]
 
 
+def test_a_recording_that_is_called_like_a_table_is_named_with_what_helps(tmp_path):
+    path = write_recording(tmp_path).rename(tmp_path / "mine.CSV")
+    for given in (path, tmp_path):
+        with pytest.raises(InputError, match="CSV begins like a recording") as caught:
+            load([given])
+        assert str(caught.value).endswith("its suffix is that of a table: name it mine.rec.")
+    assert names(load([path.rename(tmp_path / "mine.rec")])) == ["mine.rec"]
+
+
 @pytest.mark.parametrize(
     "options",
     [

@@ -54,17 +54,11 @@ from rebt_ros.robot_file.reading import robot_file_of
 from rebt_ros.robot_file.robot_file import RobotFile
 
 FORMAT = "rebt_ros/behavior_tree"
-#: Version 1 had no ``shown``, and version 2 did not say what a row is; both are read still.
 VERSION = 3
 #: The same with a robot file.
 ROBOT_VERSION = 4
-#: The fields that each version has beside those of version 1.
-_ADDED: Mapping[int, tuple[str, ...]] = {
-    1: (),
-    2: ("shown",),
-    VERSION: ("shown", "row_kind"),
-    ROBOT_VERSION: ("shown", "row_kind", "robot"),
-}
+#: The fields that each version has beside those of version 3.
+_ADDED: Mapping[int, tuple[str, ...]] = {VERSION: (), ROBOT_VERSION: ("robot",)}
 
 #: Longest document that is read, in characters.
 LARGEST_DOCUMENT = 4_000_000
@@ -375,6 +369,8 @@ def _learned_tree(place: _Place) -> LearnedTree:
         "tree",
         "suggestions",
         "provenance",
+        "shown",
+        "row_kind",
         *_ADDED[int(version)],
     )
     try:
@@ -384,8 +380,8 @@ def _learned_tree(place: _Place) -> LearnedTree:
             tree=_node(fields["tree"], DEEPEST_TREE),
             provenance=_provenance(fields["provenance"]),
             suggestions=fields["suggestions"].items(_suggestion),
-            shown=fields["shown"].items(_shown_channel) if "shown" in fields else (),
-            row_kind=fields["row_kind"].one_of(RowKind) if "row_kind" in fields else RowKind.EVENT,
+            shown=fields["shown"].items(_shown_channel),
+            row_kind=fields["row_kind"].one_of(RowKind),
             robot=_robot(fields["robot"]) if "robot" in fields else None,
         )
     except ValueError as err:
@@ -460,8 +456,9 @@ def _provenance(place: _Place) -> Provenance:
         "max_depth",
         "ccp_alpha",
         "root",
+        "history",
         "figures",
-        optional=("channels", "late_rows", "late_seconds", *_HISTORY),
+        optional=("channels", "late_rows", "late_seconds"),
     )
     late = fields.get("late_seconds")
     return Provenance(
@@ -471,7 +468,7 @@ def _provenance(place: _Place) -> Provenance:
         max_depth=fields["max_depth"].or_null(lambda: fields["max_depth"].whole(1)),
         ccp_alpha=fields["ccp_alpha"].number(0),
         root=fields["root"].one_of(Root),
-        history=_history(place, fields),
+        history=fields["history"].one_of(History),
         figures=_figures(fields["figures"]),
         channels=fields["channels"].items(_channel) if "channels" in fields else (),
         late_rows=fields["late_rows"].whole() if "late_rows" in fields else 0,
@@ -479,26 +476,13 @@ def _provenance(place: _Place) -> Provenance:
     )
 
 
-#: How version 3 says what the tree may test of what was done before, and how earlier ones did.
-_HISTORY = ("history", "uses_last_action")
-
-
-def _history(place: _Place, fields: Mapping[str, _Place]) -> History:
-    given = [name for name in _HISTORY if name in fields]
-    if len(given) != 1:
-        raise DocumentError(f"{place.path} must have either {' or '.join(map(repr, _HISTORY))}.")
-    if "history" in fields:
-        return fields["history"].one_of(History)
-    return History.LAST if fields["uses_last_action"].truth() else History.NONE
-
-
 def _channel(place: _Place) -> ChannelProvenance:
-    fields = place.fields("channel", "rows", "ccp_alpha", "figures", optional=_HISTORY)
+    fields = place.fields("channel", "rows", "ccp_alpha", "history", "figures")
     return ChannelProvenance(
         channel=fields["channel"].text(),
         rows=fields["rows"].whole(),
         ccp_alpha=fields["ccp_alpha"].number(0),
-        history=_history(place, fields),
+        history=fields["history"].one_of(History),
         figures=_figures(fields["figures"]),
     )
 

@@ -17,7 +17,7 @@ from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
 from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.csv_table import read_csv
 from rebt_ros.storage.read import Read
-from rebt_ros.storage.recording import RECORDED, is_recording, read_recording, recordings
+from rebt_ros.storage.recording import SUFFIX, is_recording, read_recording, recordings
 from rebt_ros.storage.robot_bag import read_robot_bag
 from rebt_ros.storage.text import unreadable
 
@@ -62,7 +62,7 @@ class Loaded:
     """Where features and actions are in messages, as the first file has it that says so."""
 
 
-#: Suffixes of tables in a directory, in lower case.
+#: Suffixes of tables, in lower case.
 _TABLES = frozenset({".csv", ".tsv"})
 
 
@@ -168,7 +168,7 @@ def _within(directory: Path) -> Iterator[tuple[Path, InputKind]]:
     inside = sorted(directory.iterdir())
     bags = [one for one in inside if one.is_dir() and is_bag(one)]
     recorded = (
-        one for one in inside if one.suffix in RECORDED and one.is_file() and is_recording(one)
+        one for one in inside if one.suffix == SUFFIX and one.is_file() and is_recording(one)
     )
     if first := next(recorded, None):
         if bags:
@@ -178,7 +178,7 @@ def _within(directory: Path) -> Iterator[tuple[Path, InputKind]]:
             )
         yield from ((one, InputKind.RECORDING) for one in recordings(directory))
         return
-    tables = [one for one in inside if one.suffix.lower() in _TABLES and one.is_file()]
+    tables = [one for one in inside if _has_table_suffix(one) and one.is_file()]
     if not bags and not tables:
         yield from ((one, InputKind.RECORDING) for one in recordings(directory))
         return
@@ -195,7 +195,13 @@ def _kind_of(file: Path) -> InputKind:
     refuse_strangers(file)
     if holds_messages(file):
         return InputKind.BAG
-    return InputKind.RECORDING if is_recording(file) else InputKind.TABLE
+    if _has_table_suffix(file) or not is_recording(file):
+        return InputKind.TABLE
+    return InputKind.RECORDING
+
+
+def _has_table_suffix(file: Path) -> bool:
+    return file.suffix.lower() in _TABLES
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:
@@ -230,6 +236,11 @@ def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
 
 
 def _table(path: Path, options: InputOptions) -> Read:
+    if is_recording(path):
+        raise InputError(
+            f"{path} begins like a recording, but its suffix is that of a table: "
+            f"name it {path.stem}{SUFFIX}."
+        )
     return read_csv(
         path,
         labels=options.labels,

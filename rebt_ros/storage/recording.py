@@ -26,21 +26,14 @@ from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording_head import (
     LONGEST_LINE,
     MARK,
-    TEXT_VERSION,
     Origin,
     head_line,
     read_head,
 )
 from rebt_ros.storage.recording_rows import RowEncoder, read_rows
-from rebt_ros.storage.recording_text import read_text_rows
 from rebt_ros.storage.text import unreadable
 
 SUFFIX: Final = ".rec"
-
-#: Of version 1.
-_TEXT_SUFFIX: Final = ".csv"
-#: Suffixes of recordings.
-RECORDED: Final = (SUFFIX, _TEXT_SUFFIX)
 
 #: Follows the name of a recording that is kept, but not learned from.
 ASIDE: Final = ".failed"
@@ -248,9 +241,7 @@ def recordings(directory: Path) -> tuple[Path, ...]:
         InputError: There is no such directory, or there is no recording in it.
     """
     try:
-        files = sorted(
-            one for one in directory.iterdir() if one.suffix in RECORDED and one.is_file()
-        )
+        files = sorted(one for one in directory.iterdir() if one.suffix == SUFFIX and one.is_file())
     except NotADirectoryError as err:
         raise InputError(f"{directory} is not a directory: name one with recordings.") from err
     except OSError as err:
@@ -268,16 +259,13 @@ def is_recording(path: Path) -> bool:
     """
     try:
         with path.open("rb") as file:
-            if file.read(len(MARK)) != MARK:
-                return False
-            lines = 2 if path.suffix == _TEXT_SUFFIX else 1
-            return all(file.readline(LONGEST_LINE).endswith(b"\n") for _ in range(lines))
+            return file.read(len(MARK)) == MARK and file.readline(LONGEST_LINE).endswith(b"\n")
     except OSError:
         return False
 
 
 def read_recording(path: Path) -> Read:
-    """Reads a recording, finished or not, of any version so far.
+    """Reads a recording, finished or not.
 
     Of LAT only that of the first row is read back: the others follow from the actions.
 
@@ -286,9 +274,7 @@ def read_recording(path: Path) -> Read:
     """
     try:
         with path.open("rb") as file:
-            head = read_head(path, file)
-            read = read_text_rows if head.version == TEXT_VERSION else read_rows
-            return read(path, file, head)
+            return read_rows(path, file, read_head(path, file))
     except OSError as err:
         raise unreadable(path, err) from err
 

@@ -16,8 +16,6 @@ from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError
 
-#: The first one is text, see `recording_text`; the second one is written, see `recording_rows`.
-TEXT_VERSION: Final = 1
 VERSION: Final = 2
 
 #: What every recording begins with.
@@ -26,7 +24,7 @@ MARK: Final = b"# rebt_ros recording "
 #: Longer first lines are refused, so that a file that is no recording is not read as a whole.
 LONGEST_LINE: Final = 1 << 24
 
-#: The rows of version 2 begin at a multiple of this many bytes.
+#: The rows begin at a multiple of this many bytes.
 _ALIGNMENT: Final = 64
 
 #: Sample rates beyond are none (rows per second).
@@ -48,7 +46,6 @@ class Origin(Enum):
 class Head:
     """What the first line says."""
 
-    version: int
     features: tuple[Feature, ...]
     channels: tuple[str, ...]
     sample_rate: float | None = None
@@ -76,8 +73,8 @@ class Head:
         version, features, channels = (
             values.get(one) for one in ("version", "features", "channels")
         )
-        if type(version) is not int or not TEXT_VERSION <= version <= VERSION:
-            raise ValueError(f"its version is {version!r}, not {TEXT_VERSION} or {VERSION}")
+        if type(version) is not int or version != VERSION:
+            raise ValueError(f"its version is {version!r}, not {VERSION}")
         if not isinstance(features, list) or not isinstance(channels, list):
             raise ValueError("it lists no features or no channels")
         if not all(isinstance(one, str) for one in channels):
@@ -89,7 +86,7 @@ class Head:
             raise ValueError("two features have the same name")
         sample_rate = _parse_sample_rate(values.get("sample_rate"))
         origin = _parse_origin(values.get("origin", Origin.DEMONSTRATION.value))
-        return cls(version, read, tuple(channels), sample_rate, origin)
+        return cls(read, tuple(channels), sample_rate, origin)
 
 
 def head_line(
@@ -98,7 +95,7 @@ def head_line(
     sample_rate: float | None,
     origin: Origin = Origin.DEMONSTRATION,
 ) -> bytes:
-    """The first line of a recording of version 2."""
+    """The first line of a recording."""
     description = {
         "version": VERSION,
         "sample_rate": sample_rate,

@@ -1,4 +1,4 @@
-"""Rows of a recording of version 2: records of one fixed length, which numpy reads as they are.
+"""Rows of a recording: records of one fixed length, which numpy reads as they are.
 
 All numbers are little-endian.  Actions are numbered in the order in which they occur, from 1 on; a
 record whose channel is `LABEL` holds a label's text, or a part of it, where a row holds its state:

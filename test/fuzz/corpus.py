@@ -93,32 +93,20 @@ def _two_channels() -> LearnedTree:
 
 @cache
 def documents() -> tuple[str, ...]:
-    """Behavior tree documents, one of them as version 2 was."""
+    """Behavior tree documents, one of them without what may be absent."""
     written = tuple(map(dumps, (_everything(), simple(), _two_channels())))
-    old = json.loads(written[1])
-    old["version"] = 2
-    del old["row_kind"]
-    origin = old["provenance"]
-    origin["uses_last_action"] = origin.pop("history") != "none"
-    for added in ("late_rows", "late_seconds"):
-        del origin[added]
+    sparse = json.loads(written[1])
+    origin = sparse["provenance"]
+    for optional in ("late_rows", "late_seconds"):
+        del origin[optional]
     del origin["figures"]["mean_recall"]
-    return (*written, json.dumps(old))
+    return (*written, json.dumps(sparse))
 
 
 def recordings(directory: Path) -> tuple[bytes, ...]:
-    """Recordings as they are written, and as version 1 was; a directory is needed to write one."""
+    """A recording; a directory is needed to write it."""
     features = (Feature("x", topic="state", index=0), Feature("a,b", topic="state", index=1))
     random = Random(0)
-    head = {
-        "version": 1,
-        "sample_rate": None,
-        "features": [
-            {"name": one.name, "topic": one.topic, "index": one.index} for one in features
-        ],
-        "channels": ["action", "/arm"],
-    }
-    text = f'# rebt_ros recording {json.dumps(head)}\nstamp,channel,action,last_action,x,"a,b"\n'
     with RecordingWriter(directory, features, ("action", "/arm")) as writer:
         for count in range(30):
             label = random.choice(("go", "turn", 'say "hi", twice', "größer"))
@@ -126,9 +114,7 @@ def recordings(directory: Path) -> tuple[bytes, ...]:
             state = (random.random(), -(10.0 ** random.randint(-9, 9)))
             stamp = 1_700_000_000_000_000_000 + count
             writer.write(Row(stamp, channel, label, None, state))
-            quoted = label.replace('"', '""')
-            text += f'{stamp},{channel},"{quoted}",,{state[0]!r},{state[1]!r}\n'
-    return writer.path.read_bytes(), text.encode()
+    return (writer.path.read_bytes(),)
 
 
 def tables() -> tuple[bytes, ...]:

@@ -135,7 +135,7 @@ def _check_accounts(loaded: Loaded) -> None:
 _MAKERS: Final[dict[str, Callable[[Path], Target]]] = {
     "documents": lambda _: Target("documents", _document, _read_document),
     "recordings": lambda directory: _of_files(
-        "recordings", directory, corpus.recordings(directory / "seeds"), "input.csv"
+        "recordings", directory, corpus.recordings(directory / "seeds"), "input.rec"
     ),
     "tables": lambda directory: _of_files("tables", directory, corpus.tables(), "input.csv"),
     "experiments": lambda _: Target("experiments", _experiment, _read_experiment),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.errors import RebtError
-from rebt_ros.storage.recording import read_recording
+from rebt_ros.storage.recording import SUFFIX, read_recording
 from soak.ledger import Ledger
 from soak.robot import action_in, state_of, values_from
 
@@ -22,7 +22,7 @@ def audit(directory: Path, ledger: Ledger, blocks: int) -> None:
     block_of = {state_of(block)[0]: block for block in range(blocks)}
     seen: set[int] = set()
     rows = 0
-    files = {one.resolve() for one in directory.iterdir() if one.suffix in (".csv", ".rec")}
+    files = {one.resolve() for one in directory.iterdir() if one.suffix == SUFFIX}
     for path in sorted(files | ledger.acknowledged.keys()):
         wanted = ledger.acknowledged.get(path, 0)
         try:
