@@ -24,6 +24,7 @@ from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError
+from rebt_ros.learning import evaluation
 from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.learning_file import Saved, load_learning, restored, saved, write_learning
 from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
@@ -137,6 +138,21 @@ def test_another_level_has_nothing_attached_and_unknown_ones_are_refused() -> No
     assert smallest.learned.provenance.late_rows == mine.learned.provenance.late_rows
     with pytest.raises(OptionError, match=f"there is no pruning level {last + 1}: choose one of 0"):
         mine.level(last + 1)
+
+
+def test_a_row_is_explained_by_the_branch_that_acts_and_the_rows_that_taught_it() -> None:
+    mine = learned()
+    other = again(mine)
+    chosen = evaluation.teacher_forced_choices(mine.learned.tree, mine.table)
+    for row in range(0, len(mine.table), 23):
+        explanation = other.explain(row)
+        assert explanation.action == nodes.Action(mine.table.actions[chosen[row]], "action")
+        assert explanation.support is not None
+        assert explanation.support.rows == sum(count for _, count in explanation.support.actions)
+        assert explanation.support.demonstrations
+        assert explanation.support == mine.explain(row).support
+    with pytest.raises(OptionError, match="there is no row 240: choose one of 0 to 239"):
+        other.explain(len(mine.table))
 
 
 def test_an_edited_tree_is_saved_as_it_is() -> None:

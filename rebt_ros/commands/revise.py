@@ -9,9 +9,10 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands.shell import aligned, directory, parse, run, use_color
 from rebt_ros.drawing.text import render_text
 from rebt_ros.learning.learning import Learning
-from rebt_ros.learning.learning_file import load_learning
+from rebt_ros.learning.learning_file import load_learning, write_learning
 from rebt_ros.learning.options import PsaChoice
-from rebt_ros.offline.level_files import write_revised
+from rebt_ros.offline.level_files import write_behavior_tree, write_decision_tree
+from rebt_ros.storage.atomic import write_text_atomically
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -70,13 +71,22 @@ def _revise(parsed: argparse.Namespace) -> None:
     out = parsed.out or (
         parsed.learned if parsed.learned.is_dir() else parsed.learned.absolute().parent
     )
-    notes = write_revised(out, after)
+    notes = _write(out, after)
     print(render_text(after.learned, color=use_color()), end="")
     sizes = [nodes.size(learning.learned.tree) for learning in (before, after)]
     print(f"\n{sizes[0]} nodes before, {sizes[1]} now.")
     for note in notes:
         print(f"  - {note}.")
     print(f"Written to {out}.")
+
+
+def _write(directory: Path, learning: Learning) -> tuple[str, ...]:
+    """Writes the trees, their pictures and learning.npz; returns notes, each once."""
+    notes = write_behavior_tree(directory, learning.learned)
+    write_text_atomically(directory / "tree.txt", render_text(learning.learned))
+    notes += write_decision_tree(directory, learning.decision_tree.tree)
+    notes += write_learning(directory, learning)
+    return tuple(dict.fromkeys(notes))
 
 
 def _list(learning: Learning) -> None:

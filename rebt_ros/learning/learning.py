@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.decision_tree.fitted import TrainedTree
+from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
 from rebt_ros.learning.attaching import accept
@@ -15,6 +16,7 @@ from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.levels import Evidence, Levels
 from rebt_ros.learning.options import ALL, LearnOptions, PsaChoice
 from rebt_ros.learning.report import LearningReport, report_on
+from rebt_ros.verification.explaining import Explanation, explain
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -137,6 +139,30 @@ class Learning:
         offered = tuple(one for one in learned.suggestions if not one.attached)
         plain = replace(learned, suggestions=offered)
         return replace(self, plain=plain)._accepting((), None)
+
+    def explain(self, row: int) -> Explanation:
+        """Why the tree does in a row what it does: the branch, and the rows that taught it.
+
+        Args:
+            row: Its position in the table, after what was done before it there.  For states that
+                nobody showed, see `verification.explaining.explain`.
+
+        Raises:
+            OptionError: There is no such row.
+            RuleError: The tree cannot be explained.
+        """
+        table = self.table
+        if not 0 <= row < len(table):
+            raise OptionError(f"there is no row {row}: choose one of 0 to {len(table) - 1}.")
+        previous, last = (
+            None if code == NO_ACTION else table.actions[code]
+            for code in (int(table.previous[row]), int(table.last[row]))
+        )
+        history = ActionHistory([] if last is None else [last])
+        history.previous = previous
+        values = table.states[row].tolist()
+        (explanation,) = explain(self.learned, values, {table.channel: history}, [table])
+        return explanation
 
     def _accepting(self, attached: tuple[str, ...], choice: PsaChoice | None) -> Learning:
         options = replace(self.evidence.options, attach=attached, psa_choice=choice)

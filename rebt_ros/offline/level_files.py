@@ -24,10 +24,8 @@ from rebt_ros.drawing.decision_tree_svg import render_decision_tree_svg
 from rebt_ros.drawing.dot import render_dot
 from rebt_ros.drawing.errors import PictureError
 from rebt_ros.drawing.svg import render_svg
-from rebt_ros.drawing.text import render_text
 from rebt_ros.drawing.tree_png import render_decision_tree_png, render_png
 from rebt_ros.learning.learning import Learning
-from rebt_ros.learning.learning_file import write_learning
 from rebt_ros.learning.levels import Level, Levels
 from rebt_ros.learning.progress import Progress
 from rebt_ros.storage.atomic import write_bytes_atomically, write_text_atomically
@@ -72,22 +70,6 @@ def write_decision_tree(directory: Path, tree: DecisionTree) -> list[str]:
     write_text_atomically(path.with_suffix(".svg"), render_decision_tree_svg(tree))
     write_text_atomically(path.with_suffix(".dot"), render_decision_tree_dot(tree))
     return _write_picture(path.with_suffix(".png"), partial(render_decision_tree_png, tree))
-
-
-def write_revised(directory: Path, learning: Learning) -> list[str]:
-    """Writes the trees, their pictures and learning.npz of a policy that was changed.
-
-    Returns:
-        Notes on what could not be made, each once; no full stops.
-
-    Raises:
-        StorageError: A file cannot be written.
-    """
-    notes = write_behavior_tree(directory, learning.learned)
-    write_text_atomically(directory / "tree.txt", render_text(learning.learned))
-    notes += write_decision_tree(directory, learning.decision_tree.tree)
-    notes += write_learning(directory, learning)
-    return list(dict.fromkeys(notes))
 
 
 def channel_directories(learnings: Sequence[Learning]) -> Iterator[tuple[Path, Learning]]:

@@ -6,12 +6,11 @@ import math
 import reprlib
 from collections.abc import Collection, Iterator, Mapping
 from enum import Enum
-from typing import Any, Final, NoReturn, TypeAlias, TypeVar
+from typing import Final, NoReturn, TypeAlias, TypeVar
 
 from rebt_ros.robot_file.errors import RobotFileError
+from rebt_ros.robot_file.robot_file import Json
 
-#: Texts, numbers, truth values, None, and lists and maps of them.
-Json: TypeAlias = Any
 #: Line of each place by the keys that lead there; empty where the value was no text.
 Lines: TypeAlias = Mapping[tuple[str, ...], int]
 

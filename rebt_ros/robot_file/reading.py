@@ -13,13 +13,14 @@ from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.message_path.parsing import parse
 from rebt_ros.message_path.path import MessagePath
 from rebt_ros.robot_file.errors import RobotFileError
-from rebt_ros.robot_file.place import Json, Place
+from rebt_ros.robot_file.place import Place
 from rebt_ros.robot_file.robot_file import (
     ActionSource,
     AxisLabels,
     BehaviorTreeLogActions,
     Emit,
     JoyActions,
+    Json,
     PathActions,
     RobotFile,
     Stamp,

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.message_path.path import MessagePath
-from rebt_ros.robot_file.place import Json
+
+#: Texts, numbers, truth values, None, and lists and maps of them.
+Json: TypeAlias = Any
 
 
 class Stamp(Enum):

@@ -13,7 +13,8 @@ from typing import Any, Final
 import yaml
 
 from rebt_ros.robot_file.errors import RobotFileError
-from rebt_ros.robot_file.place import Json, Lines
+from rebt_ros.robot_file.place import Lines
+from rebt_ros.robot_file.robot_file import Json
 
 #: Longest robot file, in characters.
 LARGEST: Final = 200_000
