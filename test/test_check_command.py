@@ -60,6 +60,19 @@ def test_a_broken_rule_is_exit_code_1_with_a_witness_the_region_and_the_nearest_
     assert "none of the 4 rows was shown in such a state" in out
 
 
+def test_a_tree_is_repaired_and_what_that_changes_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rules = rules_file(tmp_path, "- never: go\n  when: distance < 0.5 or docked\n")
+    mended = str(tmp_path / "mended.json")
+    tree = tree_file(tmp_path, CAREFUL)
+    check.main([tree, table_file(tmp_path), "--rules", rules, "--repair", mended])
+    out = capsys.readouterr().out
+    assert f"Written to {mended}: +3 nodes, 1 of 4 rows changed; all rules are proven." in out
+    check.main([mended, "--rules", rules])
+    assert "proven   never go when distance < 0.5 or docked" in capsys.readouterr().out
+
+
 def test_what_is_noticeable_is_said_without_rules(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -105,6 +105,38 @@ def test_no_command_follows_the_answer_to_a_disabling_call(
         assert not [one for one in commands if answered < one.sent < enabled]
 
 
+def test_a_tree_that_breaks_a_rule_is_refused_before_the_swap(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    rules = tmp_path / "rules.yaml"
+    rules.write_text("rules:\n- never: turn\n  when: x < 0.3\n")
+    parameters = {"enabled": True, "rules_file": str(rules)}
+    with NodeProcess("executor_node", domain, tmp_path, parameters) as executor:
+        publish(peer, learned(where_x_is_small(GO, TURN)))
+        robot = Robot(peer)
+        robot.obeys("go")
+        publish(peer, learned(where_x_is_small(TURN, GO)))
+        robot.until(
+            lambda: (
+                (one := peer.diagnostics.get(EXECUTION)) and values_of(one)["refused trees"] == "1"
+            ),
+            "refusal",
+        )
+        executor.says("it breaks 'never turn when x < 0.3': where x = ")
+        robot.obeys("go")
+        assert {one.data for one in robot.commands} == {"go"}
+
+
+def test_rules_that_cannot_be_read_keep_the_executor_from_starting(
+    domain: int, tmp_path: Path
+) -> None:
+    rules = tmp_path / "rules.yaml"
+    rules.write_text("rules:\n- never: turn\n  when: x <\n")
+    with NodeProcess("executor_node", domain, tmp_path, {"rules_file": str(rules)}) as executor:
+        executor.says("line 3, column 12: a feature or a number is expected, not the end")
+        assert executor.process.wait(30) != 0
+
+
 def test_a_refused_document_keeps_the_tree_running(domain: int, peer: Peer, tmp_path: Path) -> None:
     with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}) as executor:
         publish(peer, learned(where_x_is_small(GO, TURN)))

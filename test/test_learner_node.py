@@ -480,3 +480,40 @@ def test_a_relearn_writes_what_learn_writes_and_a_robot_in_a_namespace_has_its_o
     summary = json.loads((tmp_path / "learned" / "one" / "summary.json").read_text())
     assert summary["rows"] == 60
     assert summary["reasons"]
+
+
+def test_a_tree_that_breaks_a_rule_is_not_published_unless_it_is_mended(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    rules = tmp_path / "rules.yaml"
+    rules.write_text("rules:\n- never: go\n  when: x < 2\n- never: turn\n  when: x < 1\n")
+    with NodeProcess("learner_node", domain, tmp_path, {"rules_file": str(rules)}):
+        heard = peer.listen(String, "behavior_tree", LATCHED)
+        answer = peer.call("/learner/relearn")
+        assert not answer.success
+        assert "is not published, and the tree before it stays" in answer.message
+        assert "it breaks 'never go when x < 2': where x = " in answer.message
+        assert not (tmp_path / "learned" / "tree.json").exists()
+        _set(peer, repair=True)
+        answer = peer.call("/learner/relearn")
+        assert answer.success, answer.message
+        assert "Guards make it keep its rules: " in answer.message
+        tree = _latest(peer, heard, 1)
+        assert read_tree(tmp_path / "learned" / "tree.json") == tree
+        rules.write_text("rules:\n- never: fly\n")
+        answer = peer.call("/learner/relearn")
+        assert not answer.success
+        assert "line 2, column 10: there is no action 'fly'" in answer.message
+
+
+def test_a_tree_on_disk_that_breaks_a_rule_is_not_published(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    with NodeProcess("learner_node", domain, tmp_path):
+        assert peer.call("/learner/relearn").success
+    rules = tmp_path / "rules.yaml"
+    rules.write_text("rules:\n- never: go\n")
+    with NodeProcess("learner_node", domain, tmp_path, {"rules_file": str(rules)}):
+        _status(peer, "the tree on disk is not published: it breaks 'never go'")

@@ -12,6 +12,7 @@ from rebt_ros.behavior_tree.wording import Wording
 from rebt_ros.commands.shell import add_input_options, input_options, parse, run
 from rebt_ros.offline import check_and_explain
 from rebt_ros.offline.check_and_explain import Checked
+from rebt_ros.storage.tree_file import write_tree
 from rebt_ros.verification.comparing import Comparison
 from rebt_ros.verification.describing import action_text
 from rebt_ros.verification.findings import Findings
@@ -34,6 +35,12 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--rules", type=Path, metavar="FILE", help="rules.yaml (docs/rules.md)")
     parser.add_argument(
         "--against", type=Path, metavar="TREE", help="another tree: where do they differ?"
+    )
+    parser.add_argument(
+        "--repair",
+        type=Path,
+        metavar="NEW",
+        help="write a tree with guards that make it keep its rules to this file",
     )
     parser.add_argument(
         "--action-results",
@@ -64,7 +71,11 @@ def _check(parsed: argparse.Namespace) -> None:
     )
     most = max(parsed.regions, 1)
     print("\n".join(_lines(checked, most)))
-    if not checked.keeps_all:
+    if parsed.repair is not None:
+        mended = check_and_explain.repaired(checked)
+        write_tree(parsed.repair, mended.learned)
+        print(f"\nWritten to {parsed.repair}: {mended}; all rules are proven.")
+    elif not checked.keeps_all:
         sys.stdout.flush()
         sys.exit(_NOT_KEPT)
 

@@ -39,6 +39,12 @@ class Request:
     categorical_features: Sequence[str] = ()
     published: str = ""
     """The document that is published now, to be judged on the same rows; empty for none."""
+    rules: str = ""
+    """File of the rules that the tree must keep; empty for none."""
+    repair: bool = False
+    """Whether guards are put into a tree that breaks a rule; otherwise nothing is learned."""
+    action_results: bool = False
+    """Whether actions may fail or go on, for the proofs."""
 
 
 @dataclass(frozen=True, slots=True)

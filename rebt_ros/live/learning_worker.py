@@ -23,6 +23,8 @@ from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.live.learning_process import Lesson, Progress, Request
 
 if TYPE_CHECKING:
+    from rebt_ros.behavior_tree.learned_tree import LearnedTree
+    from rebt_ros.demonstration.demonstration import Demonstration
     from rebt_ros.learning.learning import Learning
     from rebt_ros.offline.result import OfflineLearning
 
@@ -160,7 +162,8 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
         options,
         lambda stage, share: tell(Progress(stage, _READING + (1.0 - _READING) * share)),
     )
-    learned = pipeline.side_by_side(learnings)
+    demonstrations = [read.demonstration for read in reads]
+    learned, mended = _ruled(pipeline.side_by_side(learnings), request, demonstrations)
     notes = [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
     notes += [note for learning in learnings for note in learning.notes]
     led = {
@@ -168,6 +171,8 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
         for learning in learnings
     }
     sentences = [f"{channel}{one.in_short()}" for channel, one in led.items() if one.in_short()]
+    if mended:
+        sentences.append(f"Guards make it keep its rules: {mended}.")
     return Lesson(
         dumps(learned),
         " ".join((pipeline.summary_sentence(learned), *sentences)),
@@ -181,6 +186,35 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
         _files(OfflineLearning(learned, learnings, tuple(notes))),
         _agreement_of(request.published, learnings),
     )
+
+
+def _ruled(
+    learned: LearnedTree, request: Request, demonstrations: Sequence[Demonstration]
+) -> tuple[LearnedTree, str]:
+    """The tree as it keeps its rules, and what guards have changed.
+
+    Raises:
+        RebtError: The rules cannot be read, or it does not keep them.
+    """
+    from rebt_ros.learning.replaying import rows_for
+    from rebt_ros.live.keeping_rules import kept, read_rules
+    from rebt_ros.verification.errors import RuleError
+
+    if not request.rules:
+        return learned, ""
+    try:
+        ruled = kept(
+            learned,
+            read_rules(Path(request.rules)),
+            rows_for(learned, demonstrations),
+            action_results=request.action_results,
+            mend=request.repair,
+        )
+    except RuleError as err:
+        raise RuleError(
+            f"the learned tree is not published, and the tree before it stays: {err}"
+        ) from err
+    return ruled.learned, ruled.mended
 
 
 def _files(result: OfflineLearning) -> dict[str, str]:

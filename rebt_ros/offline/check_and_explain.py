@@ -24,6 +24,7 @@ from rebt_ros.verification.explaining import explain as explain_state
 from rebt_ros.verification.findings import Findings, find
 from rebt_ros.verification.proof import Answer, ChannelProof, Verdict, verdicts
 from rebt_ros.verification.proof import check as prove
+from rebt_ros.verification.repairing import Repaired, repair
 from rebt_ros.verification.resolving import demands
 from rebt_ros.verification.rules import RuleSet
 from rebt_ros.verification.rules_file import loads
@@ -44,6 +45,8 @@ class Checked:
     """With another tree, where one was given."""
     rows: tuple[DemonstrationTable, ...]
     """What was shown, where it was given."""
+    results: Results
+    """How actions were taken to end."""
 
     @property
     def keeps_all(self) -> bool:
@@ -107,7 +110,18 @@ def check(
         find(learned, tables, results),
         () if against is None else compare(learned, _learned(against), tables),
         tables,
+        results,
     )
+
+
+def repaired(checked: Checked) -> Repaired:
+    """The tree with guards that make it keep its rules.
+
+    Raises:
+        RuleError: Guards are not enough.
+    """
+    asked = [one.demand for one in checked.verdicts]
+    return repair(checked.learned, asked, checked.rows, checked.results)
 
 
 def explain(

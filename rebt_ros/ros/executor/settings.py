@@ -34,6 +34,8 @@ class ExecutorSettings:
     """What the executor was started with; durations in nanoseconds."""
 
     tree_file: Path | None
+    rules_file: Path | None
+    """Rules that every tree must keep."""
     rate: float
     """Ticks per second."""
     tick_on_state: bool
@@ -60,6 +62,12 @@ def declare_settings(node: Node) -> ExecutorSettings:
     tree_file = declare.text(
         "tree_file", "", "Behavior tree document to begin with; empty for none."
     )()
+    rules_file = declare.text(
+        "rules_file",
+        "",
+        "File of rules (docs/rules.md): trees that are not proven to keep them are refused; empty "
+        "for none.",
+    )()
     rate = declare.number(
         "rate",
         20.0,
@@ -85,6 +93,7 @@ def declare_settings(node: Node) -> ExecutorSettings:
     )()
     return ExecutorSettings(
         tree_file=at_home("tree_file", tree_file) if tree_file else None,
+        rules_file=at_home("rules_file", rules_file) if rules_file else None,
         rate=rate,
         tick_on_state=tick_on == "state",
         state_timeout=nanoseconds(state_timeout),

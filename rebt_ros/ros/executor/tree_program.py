@@ -17,9 +17,11 @@ from rebt_ros.behavior_tree.novelty import NoveltyDetector
 from rebt_ros.behavior_tree.runtime import Commander, TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError
+from rebt_ros.live.keeping_rules import kept, read_rules
 from rebt_ros.live.tree_inputs import TreeInputs
 from rebt_ros.ros.command_channels import topic_of
 from rebt_ros.ros.executor.settings import ExecutorSettings
+from rebt_ros.verification.errors import RuleError
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -51,6 +53,9 @@ class Preparation:
         settings: The executor's parameters.
         commander: Carries out the actions.
         histories: What was taken on each channel, by whatever tree or person; channels are added.
+
+    Raises:
+        RebtError: The file of rules cannot be used.
     """
 
     def __init__(
@@ -63,6 +68,7 @@ class Preparation:
         self._commander = commander
         self._histories = histories
         self._retired: deque[TreeProgram] = deque()
+        self._rules = read_rules(settings.rules_file) if settings.rules_file else None
 
     def retire(self, program: TreeProgram) -> None:
         """Has the next call of `read` take a program apart that is not needed any more."""
@@ -82,6 +88,11 @@ class Preparation:
         """
         _check_channels(learned)
         _check_measurable(learned)
+        reported = bool(self._settings.action_result_topic)
+        try:
+            kept(learned, self._rules, action_results=reported)
+        except RuleError as err:
+            raise DocumentError(str(err)) from err
         topic = self._settings.state_topic
         inputs = TreeInputs(learned, topic, self._settings.state_timeout)
         for one in inputs.topics:

@@ -18,6 +18,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.errors import RebtError
+from rebt_ros.live.keeping_rules import kept, read_rules
 from rebt_ros.live.learning_process import (
     LearningCancelledError,
     LearningError,
@@ -188,6 +189,17 @@ class LearnerNode(Node):
                 f"held-out rows, and keep_if_better is set: {stays}"
             )
 
+    def _keeping_rules(self, learned: LearnedTree) -> LearnedTree:
+        """The tree, which was learned before.
+
+        Raises:
+            RebtError: It is not proven to keep the rules, or these cannot be read.
+        """
+        rules = self._settings.rules
+        path = rules.file()
+        kept(learned, read_rules(path) if path else None, action_results=rules.action_results())
+        return learned
+
     def _versions(self) -> TreeVersions:
         return TreeVersions(self._settings.output() / "trees", self._settings.kept_trees())
 
@@ -199,7 +211,7 @@ class LearnerNode(Node):
                 return response
             try:
                 path, document = self._versions().go_back()
-                learned = loads(document)
+                learned = self._keeping_rules(loads(document))
                 write_text_atomically(self._settings.output() / _TREE_FILE, document)
             except (RebtError, OSError) as err:
                 response.message = str(err)
@@ -239,6 +251,8 @@ class LearnerNode(Node):
         path = self._settings.output() / _TREE_FILE
         try:
             learned = find_tree(path)
+            if learned is not None:
+                self._keeping_rules(learned)
         except RebtError as err:
             self._last = Report(Level.WARN, f"the tree on disk is not published: {err}")
             self.get_logger().warning(self._last.message)

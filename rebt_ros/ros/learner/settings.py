@@ -15,9 +15,20 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import LARGEST_LAG
 from rebt_ros.errors import OptionError
 from rebt_ros.live.learning_process import Request
-from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.parameters import Parameters, at_home
 
 _USES: Final = ("auto", "always", "never")
+
+
+@dataclass(frozen=True, slots=True)
+class RuleSettings:
+    """What reads the parameters about rules."""
+
+    file: Callable[[], Path | None]
+    repair: Callable[[], bool]
+    """Whether guards are put into a tree that breaks a rule."""
+    action_results: Callable[[], bool]
+    """Whether the robot reports how actions end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +46,7 @@ class LearnerSettings:
     """Whether a tree that is worse than the one that is published is not published."""
     kept_trees: Callable[[], int]
     """How many of the published trees are kept."""
+    rules: RuleSettings
     binary: Callable[[], tuple[str, ...]]
     categorical: Callable[[], tuple[str, ...]]
     options: Mapping[str, Callable[[], object]]
@@ -55,6 +67,9 @@ class LearnerSettings:
             self.binary(),
             self.categorical(),
             published if self.only_better() else "",
+            str(file) if (file := self.rules.file()) else "",
+            self.rules.repair(),
+            self.rules.action_results(),
         )
 
 
@@ -105,6 +120,7 @@ def declare_settings(node: Node) -> LearnerSettings:
             100_000,
             fixed=False,
         ),
+        rules=_rules(declare),
         binary=declare.texts(
             "binary_features",
             [],
@@ -115,6 +131,32 @@ def declare_settings(node: Node) -> LearnerSettings:
             "categorical_features", [], "Features whose numbers are categories.", fixed=False
         ),
         options={**_pruning(declare), **_form(declare), **_rows(declare)},
+    )
+
+
+def _rules(declare: Parameters) -> RuleSettings:
+    """What a tree that is published must keep."""
+    file = declare.text(
+        "rules_file",
+        "",
+        "File of rules (docs/rules.md): trees that are not proven to keep them are not published; "
+        "empty for none.",
+        fixed=False,
+    )
+    return RuleSettings(
+        lambda: at_home("rules_file", name) if (name := file()) else None,
+        declare.flag(
+            "repair",
+            False,
+            "Whether guards are put into a tree that breaks a rule, instead of not publishing it.",
+            fixed=False,
+        ),
+        declare.flag(
+            "action_results",
+            False,
+            "Whether the executor has an action_result_topic, so that actions may fail.",
+            fixed=False,
+        ),
     )
 
 

@@ -1,0 +1,58 @@
+"""Trees that are let through: those that keep their rules, or are mended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.verification.contradictions import refuse_contradictions
+from rebt_ros.verification.errors import RuleError
+from rebt_ros.verification.proof import check, verdicts
+from rebt_ros.verification.repairing import repair
+from rebt_ros.verification.resolving import demands
+from rebt_ros.verification.rules import RuleSet
+from rebt_ros.verification.sweep import Results
+from rebt_ros.verification.verdict_text import what_breaks
+
+
+@dataclass(frozen=True, slots=True)
+class Ruled:
+    """A tree that is proven to keep its rules."""
+
+    learned: LearnedTree
+    mended: str = ""
+    """What guards have changed, in words; empty where none were needed."""
+
+
+def ruled(
+    learned: LearnedTree,
+    rules: RuleSet,
+    tables: Sequence[DemonstrationTable] = (),
+    *,
+    results: Results = Results.AT_ONCE,
+    mend: bool = False,
+) -> Ruled:
+    """The tree if it keeps all its rules, or a mended one that does.
+
+    Args:
+        learned: The tree.
+        rules: What it must keep.
+        tables: What was shown, with the features of the tree.
+        results: How actions end.
+        mend: Whether to put guards into a tree that breaks a rule.
+
+    Raises:
+        RuleError: It does not keep a rule, or the rules do not fit it.
+    """
+    asked = demands(rules, learned)
+    refuse_contradictions(rules.source, asked, learned)
+    proofs = check(learned, asked, tables, results)
+    broken = what_breaks(learned, proofs, verdicts(proofs, asked))
+    if not broken:
+        return Ruled(learned)
+    if not mend:
+        raise RuleError(f"{broken} ({rules.source}).")
+    mended = repair(learned, asked, tables, results)
+    return Ruled(mended.learned, str(mended))
