@@ -373,8 +373,8 @@ def test_what_no_recorder_writes_is_named_in_one_sentence(tmp_path, change, mess
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (b'"version": 2', b'"version": 3', "its version is 3, not 2: use the version"),
-        (b'"version": 2', b'"version": 1', "its version is 1, not 2: use the version"),
+        (b'"version": 2', b'"version": 4', "its version is 4, not 2 or 3: use the version"),
+        (b'"version": 2', b'"version": 1', "its version is 1, not 2 or 3: use the version"),
         (b'"version": 2', b'"version": true', "its version is True"),
         (b'"features": [', b'"features": 7, "x": [', "lists no features"),
         (b'"name": "front"', b'"name": 7', "is not a feature"),

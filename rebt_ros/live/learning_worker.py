@@ -14,7 +14,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -156,7 +156,11 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
     for place, path in enumerate(paths):
         tell(Progress("reading", _READING * place / len(paths)))
         reads.append(read_recording(path))
-    tables = tabulate([read.demonstration for read in reads], declared)
+    robot = next((read.robot for read in reads if read.robot is not None), None)
+    tables = [
+        replace(table, robot=robot)
+        for table in tabulate([read.demonstration for read in reads], declared)
+    ]
     learnings = pipeline.learn_channels(
         tables,
         options,

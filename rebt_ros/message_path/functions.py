@@ -51,7 +51,7 @@ def _defined(function: Callable[[float], float]) -> Scalar:
 SCALARS: Final[Mapping[str, Scalar]] = {
     "abs": abs,
     "negative": lambda value: -value,
-    "sign": lambda value: float((value > 0) - (value < 0)),
+    "sign": lambda value: float((value > 0) - (value < 0)) if value == value else None,
     "ceil": _defined(math.ceil),
     "floor": _defined(math.floor),
     # Foxglove's, that is JavaScript's: halves go up.

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
 from typing import Any, Final, TypeAlias
 
-from rebt_ros.demonstration.builder import LARGEST_VALUE
+from rebt_ros.demonstration.builder import LARGEST_VALUE, StateTopic
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.message_path.compiling import Getter, Value, attribute_of, getter
 from rebt_ros.message_path.definition import Primitive
 from rebt_ros.robot_file.binding import BoundFeature, BoundTopic
+from rebt_ros.robot_file.robot_file import RobotFile
 
 #: Most categories of one feature; what comes after them is missing.
 MOST_CATEGORIES: Final = 1000
@@ -101,6 +102,18 @@ class FeatureReader:
         return values
 
 
+def state_topics_of(robot: RobotFile) -> tuple[StateTopic, ...]:
+    """The topics of the state with the names of their features."""
+    return tuple(
+        StateTopic(
+            topic,
+            tuple(one.name for one in robot.state if one.path.topic == topic),
+            may_miss=True,
+        )
+        for topic in robot.state_topics
+    )
+
+
 def _encoder(feature: BoundFeature, categories: dict[str, Categories]) -> _Encoder:
     if feature.kind is FeatureKind.NUMERIC:
         return lambda value: float(value) if value is not None else math.nan
@@ -127,17 +140,19 @@ def _text_of(feature: BoundFeature) -> Callable[[Value], str]:
 
 def described(
     features: Sequence[Feature],
-    topics: Sequence[BoundTopic],
+    topics: Iterable[BoundTopic],
     categories: Mapping[str, Categories],
 ) -> tuple[Feature, ...]:
-    """Features of rows with their kinds, and the categories that were seen."""
+    """Features of rows with their kinds, and the categories that were seen.
+
+    One that has no category yet is numeric.
+    """
     kinds = {one.name: one.kind for topic in topics for one in topic.features}
     found = []
     for feature in features:
         kind = kinds.get(feature.name, FeatureKind.NUMERIC)
         names = tuple(categories[feature.name].names) if feature.name in categories else ()
         if kind is FeatureKind.CATEGORICAL and not names:
-            # It was missing all the time.
             kind = FeatureKind.NUMERIC
         found.append(replace(feature, kind=kind, categories=names))
     return tuple(found)

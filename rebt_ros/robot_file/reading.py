@@ -11,7 +11,7 @@ from typing import Final
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.message_path.parsing import parse
-from rebt_ros.message_path.path import MessagePath
+from rebt_ros.message_path.path import PLAIN_TOPIC, MessagePath
 from rebt_ros.robot_file.errors import RobotFileError
 from rebt_ros.robot_file.place import Place
 from rebt_ros.robot_file.robot_file import (
@@ -100,6 +100,9 @@ def _robot_file(place: Place, name: str, content: Json) -> RobotFile:
         if "actions" in fields
         else {}
     )
+    for key, its in _listed(fields["actions"]) if "actions" in fields else ():
+        if not PLAIN_TOPIC.fullmatch(key):
+            its.refuse("must have a name as topics have: letters, digits, _ and /")
     topics = (
         {key: _topic(its) for key, its in _listed(fields["topics"])} if "topics" in fields else {}
     )

@@ -66,6 +66,15 @@ class GraphWatch:
         sentence = "use_sim_time is set, and waiting for /clock: start the simulator, or unset it"
         return self._noted([(sentence, True)] if waits else [])
 
+    def note(self, sentence: str, *, waits: bool) -> None:
+        """Logs a finding of somebody else, once.
+
+        Args:
+            sentence: Without a full stop.
+            waits: Whether it may well change, so that it is logged only after a while.
+        """
+        self._noted([(sentence, waits)])
+
     def _about(self, subscription: Subscription) -> Iterator[tuple[str, bool]]:
         """What is wrong with it, and whether that may well change."""
         topic = subscription.topic_name

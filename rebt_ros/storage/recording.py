@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +21,8 @@ from rebt_ros.demonstration.builder import LARGEST_VALUE, is_label
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError
+from rebt_ros.robot_file.features import Categories
+from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.atomic import StorageError, sync_directory
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording_head import (
@@ -52,6 +54,8 @@ class RecordingWriter:
         channels: Action topics that rows may come on.
         sample_rate: Rows per second and channel if the demonstration is sampled, else None.
         origin: Why it was shown.
+        robot: Where the features are in messages; None where they are arrays of numbers.
+        categories: Those of the features by name, where there is a robot file; may grow.
 
     Raises:
         RecordingError: The file cannot be created.
@@ -70,13 +74,21 @@ class RecordingWriter:
         *,
         sample_rate: float | None = None,
         origin: Origin = Origin.DEMONSTRATION,
+        robot: RobotFile | None = None,
+        categories: Mapping[str, Categories] | None = None,
     ) -> None:
         if not features:
             raise ValueError("a recording needs at least one feature")
         self.rows = 0
         self._width = len(features)
         self._channels = frozenset(channels)
-        self._encoder = RowEncoder(channels, self._width)
+        self._may_miss = robot is not None
+        texts = {
+            place: (categories or {})[feature.name]
+            for place, feature in enumerate(features)
+            if feature.name in (categories or {}) and (categories or {})[feature.name].is_open
+        }
+        self._encoder = RowEncoder(channels, self._width, texts)
         self._size = 0
         self._named = False
         self._descriptor: int | None = None
@@ -89,7 +101,10 @@ class RecordingWriter:
                 "name a directory with room where you may write."
             ) from err
         try:
-            self._append(head_line(features, channels, sample_rate, origin))
+            head = head_line(
+                features, channels, sample_rate, origin, texts=texts.keys(), robot=robot
+            )
+            self._append(head)
         except RecordingError:
             self.discard()
             raise
@@ -106,7 +121,10 @@ class RecordingWriter:
                 f"a row on {row.channel!r} with {len(row.state)} values does not fit "
                 f"{self._width} features and the channels {sorted(self._channels)}"
             )
-        in_range = all(abs(value) <= LARGEST_VALUE for value in row.state)
+        in_range = all(
+            abs(value) <= LARGEST_VALUE or (self._may_miss and value != value)
+            for value in row.state
+        )
         labels = (row.action, row.last_action) if row.last_action is not None else (row.action,)
         if not in_range or not all(map(is_label, labels)):
             raise ValueError(f"{row} could not be read back")

@@ -6,17 +6,22 @@ It is the mark `# rebt_ros recording`, and JSON.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Any, BinaryIO, Final
 
 from rebt_ros.demonstration.demonstration import RowKind
-from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError
+from rebt_ros.robot_file.errors import RobotFileError
+from rebt_ros.robot_file.reading import robot_file_of
+from rebt_ros.robot_file.robot_file import RobotFile
 
 VERSION: Final = 2
+#: The same by a robot file: values may be missing, and features hold categories or texts.
+ROBOT_VERSION: Final = 3
 
 #: What every recording begins with.
 MARK: Final = b"# rebt_ros recording "
@@ -26,6 +31,9 @@ LONGEST_LINE: Final = 1 << 24
 
 #: The rows begin at a multiple of this many bytes.
 _ALIGNMENT: Final = 64
+
+#: Kind of a feature whose values are numbers of texts.
+_TEXT_KIND: Final = "text"
 
 #: Sample rates beyond are none (rows per second).
 _LARGEST_RATE: Final = 1e9
@@ -51,6 +59,14 @@ class Head:
     sample_rate: float | None = None
     """Rows per second and channel; None for a row per action message."""
     origin: Origin = Origin.DEMONSTRATION
+    texts: frozenset[int] = frozenset()
+    """Places of features whose values are numbers of texts (see `recording_rows`)."""
+    robot: RobotFile | None = None
+
+    @property
+    def may_miss(self) -> bool:
+        """Whether values may be missing, as NaN."""
+        return self.robot is not None
 
     @property
     def row_kind(self) -> RowKind:
@@ -73,8 +89,8 @@ class Head:
         version, features, channels = (
             values.get(one) for one in ("version", "features", "channels")
         )
-        if type(version) is not int or version != VERSION:
-            raise ValueError(f"its version is {version!r}, not {VERSION}")
+        if type(version) is not int or version not in (VERSION, ROBOT_VERSION):
+            raise ValueError(f"its version is {version!r}, not {VERSION} or {ROBOT_VERSION}")
         if not isinstance(features, list) or not isinstance(channels, list):
             raise ValueError("it lists no features or no channels")
         if not all(isinstance(one, str) for one in channels):
@@ -86,7 +102,13 @@ class Head:
             raise ValueError("two features have the same name")
         sample_rate = _parse_sample_rate(values.get("sample_rate"))
         origin = _parse_origin(values.get("origin", Origin.DEMONSTRATION.value))
-        return cls(read, tuple(channels), sample_rate, origin)
+        head = cls(read, tuple(channels), sample_rate, origin)
+        if version < ROBOT_VERSION:
+            return head
+        texts = frozenset(
+            place for place, one in enumerate(features) if one.get("kind") == _TEXT_KIND
+        )
+        return replace(head, texts=texts, robot=_parse_robot(values.get("robot")))
 
 
 def head_line(
@@ -94,10 +116,13 @@ def head_line(
     channels: Sequence[str],
     sample_rate: float | None,
     origin: Origin = Origin.DEMONSTRATION,
+    *,
+    texts: Collection[int] = (),
+    robot: RobotFile | None = None,
 ) -> bytes:
-    """The first line of a recording."""
-    description = {
-        "version": VERSION,
+    """The first line of a recording; see `Head`."""
+    description: dict[str, Any] = {
+        "version": VERSION if robot is None else ROBOT_VERSION,
         "sample_rate": sample_rate,
         "origin": origin.value,
         "features": [
@@ -106,6 +131,15 @@ def head_line(
         ],
         "channels": list(channels),
     }
+    if robot is not None:
+        description["robot"] = robot.content
+        for place, (feature, its) in enumerate(zip(features, description["features"], strict=True)):
+            if place in texts:
+                its["kind"] = _TEXT_KIND
+            elif feature.kind is not FeatureKind.NUMERIC:
+                its["kind"] = feature.kind.value
+            if feature.categories:
+                its["categories"] = list(feature.categories)
     line = MARK + json.dumps(description).encode()
     return line + b" " * (-(len(line) + 1) % _ALIGNMENT) + b"\n"
 
@@ -159,4 +193,23 @@ def _parse_feature(value: object) -> Feature:
         and not isinstance(index, bool)
     ):
         raise ValueError(f"{value!r} is not a feature")
-    return Feature(name, topic=topic, index=index)
+    kind, categories = value.get("kind", "numeric"), value.get("categories", [])
+    if kind == _TEXT_KIND:
+        return Feature(name, topic=topic, index=index)
+    kinds = {one.value: one for one in FeatureKind}
+    if not (
+        isinstance(kind, str)
+        and kind in kinds
+        and isinstance(categories, list)
+        and all(isinstance(one, str) for one in categories)
+        and len(set(categories)) == len(categories)
+    ):
+        raise ValueError(f"{value!r} is not a feature")
+    return Feature(name, kinds[kind], tuple(categories), topic, index)
+
+
+def _parse_robot(value: object) -> RobotFile:
+    try:
+        return robot_file_of(value, "its robot file")
+    except RobotFileError as err:
+        raise ValueError(str(err).rstrip(".")) from err

@@ -11,6 +11,9 @@ record whose channel is `LABEL` holds a label's text, or a part of it, where a r
 | last_action | number of the LAT, 0 without one | how many bytes of text the record holds |
 | checksum | makes the sum of the record's 32-bit words 2**32 - 1, modulo 2**32 | as in a row |
 | state | the features' values | UTF-8 text, followed by zeros |
+
+In version 3 a value may be NaN, where it is missing, and that of a feature that holds texts is the
+number of a label.
 """
 
 from __future__ import annotations
@@ -18,7 +21,8 @@ from __future__ import annotations
 import io
 import os
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, Final, cast
 
@@ -28,7 +32,9 @@ from numpy.typing import NDArray
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.demonstration.builder import LARGEST_VALUE, is_label
 from rebt_ros.demonstration.demonstration import Demonstration, Row, in_sorted_order
+from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError
+from rebt_ros.robot_file.features import Categories
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording_head import Head
@@ -62,9 +68,13 @@ class RowEncoder:
     Args:
         channels: Channels of the rows.
         width: Number of features, at least one.
+        texts: The categories of features that hold texts, by their place; they may grow.
     """
 
-    def __init__(self, channels: Sequence[str], width: int) -> None:
+    def __init__(
+        self, channels: Sequence[str], width: int, texts: Mapping[int, Categories] | None = None
+    ) -> None:
+        self._texts = texts or {}
         self._channels = {channel: number for number, channel in enumerate(channels)}
         self._numbers: dict[str, int] = {}
         self._room = 8 * width
@@ -80,15 +90,28 @@ class RowEncoder:
     def encode(self, row: Row) -> bytes:
         """The record of a row, after those of labels that it is the first to use."""
         names = [row.last_action, row.action] if row.last_action else [row.action]
+        state = row.state
+        if self._texts:
+            found = {
+                place: categories.names[int(state[place])]
+                for place, categories in self._texts.items()
+                if state[place] == state[place]
+            }
+            names = list(dict.fromkeys((*names, *found.values())))
         labels = b"".join(self._introduced(name) for name in names if name not in self._numbers)
         last_action = self._numbers[row.last_action] if row.last_action else 0
+        if self._texts:
+            numbered = list(state)
+            for place, name in found.items():
+                numbered[place] = float(self._numbers[name])
+            state = tuple(numbered)
         return labels + self._checked(
             self._row,
             row.stamp,
             self._channels[row.channel],
             self._numbers[row.action],
             last_action,
-            row.state,
+            state,
         )
 
     def forget(self, labels: int) -> None:
@@ -155,7 +178,8 @@ def read_rows(path: Path, file: BinaryIO, head: Head) -> Read:
         left_out["are damaged"] = seen - damaged
     shown = columns.demonstration()
     stated, sound_ones = seen + bool(rest), damaged if damaged >= 0 else seen
-    return Read(shown, tuple(notes), Account("records", stated, sound_ones, len(shown), left_out))
+    account = Account("records", stated, sound_ones, len(shown), left_out)
+    return Read(shown, tuple(notes), account, robot=head.robot)
 
 
 def _chunks(file: BinaryIO, kind: np.dtype[np.void], count: int) -> Iterator[Records]:
@@ -212,8 +236,12 @@ class _Columns:
                 self._before.setdefault(int(channel), int(last))
         states = self._states[part]
         states[...] = records["state"]
-        # Also false where there is a NaN.
-        if not (states.min() >= -LARGEST_VALUE and states.max() <= LARGEST_VALUE):
+        if self._head.may_miss:
+            in_range = not np.any(np.abs(states) > LARGEST_VALUE)
+        else:
+            # Also false where there is a NaN.
+            in_range = bool(states.min() >= -LARGEST_VALUE and states.max() <= LARGEST_VALUE)
+        if not in_range:
             self._refuse_value(part.start)
         if records["channel"].max() >= len(self._head.channels):
             raise self._wrong("a channel is not one of those in its first line")
@@ -227,9 +255,11 @@ class _Columns:
             raise self._wrong("an action has no label")
         if max(self._before.values(), default=0) > len(labels):
             raise self._wrong("a last action has no label")
+        features = self._described(labels)
+        self._check_categories(features)
         return Demonstration(
             self._path.name,
-            self._head.features,
+            features,
             self._states[rows],
             self._stamps[rows],
             *_occurring(labels, actions),
@@ -241,6 +271,34 @@ class _Columns:
             },
             self._head.row_kind,
         )
+
+    def _described(self, labels: tuple[str, ...]) -> tuple[Feature, ...]:
+        """The features, those that hold texts with the texts that occur as their categories."""
+        features = list(self._head.features)
+        for place in self._head.texts:
+            column = self._states[: self._rows, place]
+            known = ~np.isnan(column)
+            numbers, codes = np.unique(column[known], return_inverse=True)
+            if not numbers.size:
+                continue
+            if not (numbers[0] >= 1 and numbers[-1] <= len(labels)) or np.any(numbers % 1):
+                raise self._wrong(f"{features[place].name!r} holds a text that is not there")
+            column[known] = codes
+            names = tuple(labels[int(number) - 1] for number in numbers)
+            features[place] = replace(
+                features[place], kind=FeatureKind.CATEGORICAL, categories=names
+            )
+        return tuple(features)
+
+    def _check_categories(self, features: Sequence[Feature]) -> None:
+        for place, feature in enumerate(features):
+            if feature.kind is FeatureKind.NUMERIC:
+                continue
+            column = self._states[: self._rows, place]
+            known = column[~np.isnan(column)]
+            most = len(feature.categories) or 2
+            if np.any((known < 0) | (known >= most) | (known % 1 != 0)):
+                raise self._wrong(f"{feature.name!r} holds a value that is none of its categories")
 
     def _add_label(self, number: int, content: bytes, size: int) -> None:
         if number == len(self._labels) + 1:

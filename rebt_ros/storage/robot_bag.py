@@ -10,11 +10,11 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Final
 
-from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
+from rebt_ros.demonstration.builder import DemonstrationBuilder
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.errors import InputError, printable
 from rebt_ros.robot_file.binding import BoundTopic, bind
-from rebt_ros.robot_file.features import Categories, FeatureReader, described
+from rebt_ros.robot_file.features import Categories, FeatureReader, described, state_topics_of
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.bag import (
     LATEST,
@@ -78,7 +78,7 @@ def read_robot_bag(
         categories: dict[str, Categories] = {}
         readers = {one.name: FeatureReader(one, categories) for one in states}
         builder = DemonstrationBuilder(
-            [StateTopic(name, reader.names, may_miss=True) for name, reader in readers.items()],
+            state_topics_of(robot),
             list(robot.actions),
             sample_rate,
         )

@@ -26,12 +26,15 @@ from rebt_ros.live.arrival import LAST, ArrivalOrder
 from rebt_ros.live.losses import Losses
 from rebt_ros.live.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
 from rebt_ros.live.state_streams import StateStreams
+from rebt_ros.robot_file.binding import BoundTopic
+from rebt_ros.robot_file.features import Categories, FeatureReader, described
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.graph_watch import GraphWatch
 from rebt_ros.ros.recorder.sending_time import SendingTime, received_at
 from rebt_ros.ros.recorder.settings import declare_settings
+from rebt_ros.ros.robot_files import RobotTopics
 from rebt_ros.storage.recording import RecordingWriter
 from rebt_ros.storage.recording_head import Origin
 
@@ -108,9 +111,14 @@ class RecorderNode(Node):
         self._reported = time.monotonic()
         self._immediate = settings.reorder_window == 0
         self._sources: list[Subscription] = []
+        self._robot: RobotTopics | None = None
+        self._readers: dict[str, FeatureReader] = {}
+        self._categories: dict[str, Categories] = {}
         self._listen_to_demonstrator()
         self._listen_to_executor()
         topics = [source.topic_name for source in self._sources]
+        if settings.robot is not None:
+            topics += map(self.resolve_topic_name, settings.sources)
         self._sending = SendingTime(self, topics, settings.pair_by)
         self._watch = GraphWatch(self)
         self._ready = self.create_publisher(Bool, "~/ready", DRIVING_QOS)
@@ -169,18 +177,33 @@ class RecorderNode(Node):
 
     def _open_writer(self, features: tuple[Feature, ...], origin: Origin) -> Writer:
         settings = self._settings
+        if self._robot is not None:
+            known = {name: its for name, its in self._categories.items() if not its.is_open}
+            features = described(features, self._robot.bound.values(), known)
         writer = RecordingWriter(
             settings.demonstrations,
             features,
             settings.action_topics,
             sample_rate=settings.sample_rate,
             origin=origin,
+            robot=settings.robot,
+            categories=self._categories,
         )
         self.get_logger().info(f"recording to {writer.path}.")
         return writer
 
     def _listen_to_demonstrator(self) -> None:
         waking = None if self._immediate else _Fetched()
+        if self._settings.robot is not None:
+            self._robot = RobotTopics(
+                self,
+                self._settings.robot,
+                self._settings.sources,
+                _QUEUE,
+                self._robot_callback,
+                waking,
+            )
+            return
         states, actions = QoSProfile(depth=_QUEUE), QoSProfile(depth=_QUEUE)
         if self._settings.best_effort:
             states.reliability = ReliabilityPolicy.BEST_EFFORT
@@ -196,6 +219,22 @@ class RecorderNode(Node):
             self._sources.append(
                 self.create_subscription(String, channel, take, actions, callback_group=waking)
             )
+
+    def _robot_callback(self, bound: BoundTopic) -> Callable[..., None]:
+        if bound.features and bound.name not in self._readers:
+            self._readers[bound.name] = FeatureReader(bound, self._categories)
+
+        def take(message: Any, info: dict[str, Any]) -> None:
+            self._on_message(bound, message, info)
+
+        return take
+
+    @property
+    def _demonstrators(self) -> list[Subscription]:
+        """The subscriptions to states and actions."""
+        if self._robot is not None:
+            return list(self._robot.subscriptions.values())
+        return self._sources[: len(self._settings.sources)]
 
     def _listen_to_executor(self) -> None:
         """Subscribes to what tells demonstrations and corrections apart."""
@@ -234,6 +273,28 @@ class RecorderNode(Node):
                     f"topic {topic!r} is {name}, which state_topics and action_topics name twice."
                 )
 
+    def _on_message(self, bound: BoundTopic, message: Any, info: dict[str, Any]) -> None:
+        """Takes a message of a topic of the robot file."""
+        topic, reader = bound.name, self._readers.get(bound.name)
+        self._note(topic, info)
+        sent = self._sending.of(info)
+        if bound.has_stamp:
+            stamp_of_header = message.header.stamp
+            sent = stamp_of_header.sec * 1_000_000_000 + stamp_of_header.nanosec
+        place = received_at(info) if sent is None else sent
+        # What is done follows from what was there before this message.
+        for channel, labeller in bound.labellers.items():
+            for label in labeller.labels(message, place):
+                self._queue_action(channel, label, sent, info)
+        if reader is None:
+            return
+        self._received[topic] += 1
+        self._heard[topic] = time.monotonic()
+        if sent is not None:
+            self._streams.take(topic, sent, time.monotonic_ns())
+        values, stamp = reader.read(message, place), self._stamp(place)
+        self._queue(place, partial(self._session.observe, stamp, topic, values, (), sent))
+
     def _on_state(self, topic: str, message: Float64MultiArray, info: dict[str, Any]) -> None:
         self._received[topic] += 1
         self._heard[topic] = time.monotonic()
@@ -248,18 +309,22 @@ class RecorderNode(Node):
 
     def _on_action(self, topic: str, message: String, info: dict[str, Any]) -> None:
         self._note(topic, info)
-        sent = self._sending.of(info)
+        self._queue_action(topic, message.data, self._sending.of(info), info)
+
+    def _queue_action(
+        self, channel: str, label: str, sent: int | None, info: dict[str, Any]
+    ) -> None:
         received = received_at(info)
         late = (received - (info.get("source_timestamp") or received)) / 1e9
         if sent is None and late > _LATE:
             self._faults.note(
                 "late action",
-                f"an action on {topic!r} came {late:.1f} s after it was sent and has the state of "
-                "its arrival: wait until recorder and publisher know each other, and check that "
+                f"an action on {channel!r} came {late:.1f} s after it was sent and has the state "
+                "of its arrival: wait until recorder and publisher know each other, and check that "
                 "their clocks agree.",
             )
         place = received if sent is None else sent
-        take = partial(self._session.act, self._stamp(place), topic, message.data, sent)
+        take = partial(self._session.act, self._stamp(place), channel, label, sent)
         self._queue(place, take, waits=sent is not None)
 
     def _note(self, topic: str, info: dict[str, Any]) -> None:
@@ -273,6 +338,9 @@ class RecorderNode(Node):
         return received_at(info) if sent is None else sent
 
     def _look_at_publishers(self) -> None:
+        if self._robot is not None:
+            for problem in self._robot.look():
+                self._watch.note(problem, waits=problem.startswith("nobody"))
         ready = not self._unheard()
         if ready is not self._said_ready:
             self._said_ready = ready
@@ -284,18 +352,17 @@ class RecorderNode(Node):
 
     def _unheard(self) -> list[str]:
         """Topics that would be missing in a demonstration that began now."""
-        demonstrators = self._sources[: len(self._settings.sources)]
         states = {topic.name for topic in self._settings.state_topics}
         return [
             name
-            for name, source in zip(self._settings.sources, demonstrators, strict=True)
-            if (name not in self._heard if name in states else not source.get_publisher_count())
+            for name in self._settings.sources
+            if (name not in self._heard if name in states else not self.count_publishers(name))
         ]
 
     def _problems(self) -> list[str]:
         """What in the graph keeps this node from recording."""
-        demonstrators = self._sources[: len(self._settings.sources)]
-        return [*self._watch.timeless(), *self._watch.unheard(demonstrators)]
+        unfit = self._robot.look() if self._robot is not None else []
+        return [*self._watch.timeless(), *unfit, *self._watch.unheard(self._demonstrators)]
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any
@@ -347,7 +414,8 @@ class RecorderNode(Node):
         On a busy machine the executor may come back late, with this timer first and with many
         messages waiting; however long they wait, their order must not depend on it.
         """
-        for source in self._sources:
+        further = self._demonstrators if self._robot is not None else []
+        for source in (*self._sources, *further):
             with source.handle:
                 for _ in range(_QUEUE):
                     taken = source.handle.take_message(source.msg_type, source.raw)

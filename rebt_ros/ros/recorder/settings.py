@@ -10,8 +10,11 @@ from rclpy.node import Node
 
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.errors import OptionError
+from rebt_ros.robot_file.features import state_topics_of
+from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.ros.parameters import Parameters, nanoseconds
 from rebt_ros.ros.recorder.sending_time import PairBy
+from rebt_ros.ros.robot_files import robot_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,9 @@ class RecorderSettings:
 
     state_topics: tuple[StateTopic, ...]
     action_topics: tuple[str, ...]
+    """The channels."""
+    robot: RobotFile | None
+    """Where features and actions are in messages; None where they are arrays and strings."""
     executor: ExecutorTopics
     demonstrations: Path
     """Directory of the recordings."""
@@ -48,6 +54,8 @@ class RecorderSettings:
     @property
     def sources(self) -> tuple[str, ...]:
         """State topics, then action topics."""
+        if self.robot is not None:
+            return tuple(dict.fromkeys((*self.robot.state_topics, *self.robot.action_topics)))
         return (*(topic.name for topic in self.state_topics), *self.action_topics)
 
 
@@ -102,11 +110,16 @@ def declare_settings(node: Node) -> RecorderSettings:
         "received, or auto, for when they were sent if all publishers are on this machine.",
         choices=[one.value for one in PairBy],
     )()
+    actions = declare.texts(
+        "action_topics", ["action"], "String topics; each is a channel of its own."
+    )()
+    robot = robot_file(declare)
+    if robot is not None:
+        _check_beside(robot, names, fields, actions)
     return RecorderSettings(
-        state_topics=_state_topics(names, fields),
-        action_topics=declare.texts(
-            "action_topics", ["action"], "String topics; each is a channel of its own."
-        )(),
+        state_topics=_state_topics(names, fields) if robot is None else state_topics_of(robot),
+        action_topics=actions if robot is None else tuple(robot.actions),
+        robot=robot,
         executor=_executor_topics(declare),
         demonstrations=declare.directory(
             "demonstrations", "demonstrations", "Directory of the recordings; ~ is your home."
@@ -127,6 +140,23 @@ def declare_settings(node: Node) -> RecorderSettings:
             3600.0,
         )(),
     )
+
+
+def _check_beside(
+    robot: RobotFile, states: Sequence[str], fields: Sequence[str], actions: Sequence[str]
+) -> None:
+    """Refuses topics beside a robot file, which says itself what they are.
+
+    Raises:
+        OptionError: There are some, or the robot file shows no actions.
+    """
+    if fields or tuple(states) != ("state",) or tuple(actions) != ("action",):
+        raise OptionError(
+            "parameter 'robot_file' is set, which says what the topics are: leave state_topics, "
+            "state_fields and action_topics out."
+        )
+    if not robot.actions:
+        raise OptionError(f"{robot.name} has no part 'actions', so that nothing can be recorded.")
 
 
 def _executor_topics(declare: Parameters) -> ExecutorTopics:
