@@ -68,7 +68,7 @@ class NoveltyDetector:
         margin: float,
     ) -> None:
         self._columns = tuple(
-            _Column(place, feature, default_topic)
+            _Column(place, feature, default_topic, coded=learned.robot is not None)
             for place, feature in enumerate(learned.features)
             if not feature.lag and (feature.topic or default_topic) in topics
         )
@@ -101,9 +101,10 @@ class _Column:
         place: Its place among the features of the tree.
         feature: The feature.
         default_topic: Its topic where it names none.
+        coded: Whether messages hold positions of categories, not their numbers.
     """
 
-    def __init__(self, place: int, feature: Feature, default_topic: str) -> None:
+    def __init__(self, place: int, feature: Feature, default_topic: str, *, coded: bool) -> None:
         self.place = place
         self.name = feature.name
         self.categories = feature.categories
@@ -112,7 +113,7 @@ class _Column:
         self._codes = {
             number: code
             for code, name in enumerate(feature.categories)
-            if (number := _number(name)) is not None
+            if (number := float(code) if coded else _number(name)) is not None
         }
 
     def value(self, latest: Mapping[str, Sequence[float]]) -> float:

@@ -376,9 +376,12 @@ class StateEncoder:
     Args:
         features: The learned tree's features.
         default_topic: Topic of features that came from a table, in their order there.
+        coded: Whether messages hold positions of categories, not their numbers.
     """
 
-    def __init__(self, features: Sequence[Feature], default_topic: str = "state") -> None:
+    def __init__(
+        self, features: Sequence[Feature], default_topic: str = "state", *, coded: bool = False
+    ) -> None:
         self._sources = [
             (
                 feature,
@@ -391,7 +394,7 @@ class StateEncoder:
             {
                 number: float(code)
                 for code, name in enumerate(feature.categories)
-                if (number := number_of(name)) is not None
+                if (number := float(code) if coded else number_of(name)) is not None
             }
             for feature in features
         ]

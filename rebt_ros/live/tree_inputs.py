@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import StateEncoder
 from rebt_ros.demonstration.builder import BadMessageError, Fault
+from rebt_ros.robot_file.robot_file import RobotFile
 
 
 class Message(NamedTuple):
@@ -29,7 +30,7 @@ class TreeInputs:
     Args:
         learned: The tree and its features.
         default_topic: Topic of features that came from a table, in their order there.
-        timeout: How long a message stays fresh.
+        timeout: How long a message stays fresh, where the tree's robot file does not say.
     """
 
     def __init__(self, learned: LearnedTree, default_topic: str, timeout: int) -> None:
@@ -43,9 +44,12 @@ class TreeInputs:
             for place, feature in enumerate(learned.features)
             if feature.name in tested
         }
-        self._encoder = StateEncoder(tuple(self._read.values()))
+        robot = learned.robot
+        self._may_miss = robot is not None
+        self._encoder = StateEncoder(tuple(self._read.values()), coded=self._may_miss)
         self._state = [math.nan] * len(learned.features)
         self._timeout = timeout
+        self._timeouts = {} if robot is None else _timeouts(robot, tested)
         self._latest: dict[str, Message] = {}
         self.topics = tuple(self._encoder.topics)
         """The state topics that the tree reads."""
@@ -73,7 +77,9 @@ class TreeInputs:
             )
         for feature in self._read.values():
             assert feature.index is not None
-            if feature.topic == topic and not math.isfinite(message.values[feature.index]):
+            if self._may_miss or feature.topic != topic:
+                continue
+            if not math.isfinite(message.values[feature.index]):
                 raise BadMessageError(
                     Fault.NOT_FINITE,
                     f"state topic {topic!r} sent {message.values[feature.index]} for feature "
@@ -103,7 +109,7 @@ class TreeInputs:
             if message is None:
                 stale[topic] = "never received"
             # A negative age is that of a clock that was set back.
-            elif not 0 <= now - message.received <= self._timeout:
+            elif not 0 <= now - message.received <= self._timeouts.get(topic, self._timeout):
                 stale[topic] = f"{(now - message.received) / 1e9:.1f} s old"
         return stale
 
@@ -120,3 +126,13 @@ class TreeInputs:
     def reset(self) -> None:
         """Empties the window of lagged features, as the ticks to come do not follow the last."""
         self._encoder.reset()
+
+
+def _timeouts(robot: RobotFile, tested: Collection[str]) -> dict[str, int]:
+    """How long messages of topics stay fresh (ns): as long as the first of what is tested does."""
+    timeouts: dict[str, int] = {}
+    for feature in robot.state:
+        if feature.max_age is not None and feature.name in tested:
+            age, topic = round(feature.max_age * 1e9), feature.path.topic
+            timeouts[topic] = min(age, timeouts.get(topic, age))
+    return timeouts

@@ -94,7 +94,7 @@ class RobotTopics:
             if topic not in self.bound:
                 self._try_to_bind(topic, publishers[0].topic_type)
             if topic in self.bound:
-                self._follow(topic, [one.qos_profile for one in publishers])
+                self._try_to_follow(topic, [one.qos_profile for one in publishers])
         return [
             *self._problems.values(),
             *(
@@ -104,16 +104,29 @@ class RobotTopics:
             ),
         ]
 
+    def close(self) -> None:
+        """Ends all subscriptions."""
+        for subscription in self.subscriptions.values():
+            self._node.destroy_subscription(subscription)
+        self.subscriptions.clear()
+
     def _try_to_bind(self, topic: str, kind: str) -> None:
         try:
             self._bind(topic, kind)
         except RebtError as err:
             self._problems[topic] = str(err).rstrip(".")
-        else:
-            self._problems.pop(topic, None)
 
     def _bind(self, topic: str, kind: str) -> None:
         self.bound[topic] = bind(self._robot, topic, kind, installed)
+
+    def _try_to_follow(self, topic: str, offered: list[QoSProfile]) -> None:
+        try:
+            self._follow(topic, offered)
+        except Exception:  # of rclpy: a name that cannot be, or that this node has another type for
+            kind = self.bound[topic].kind
+            self._problems[topic] = f"topic {topic!r} cannot be subscribed to as {kind}"
+        else:
+            self._problems.pop(topic, None)
 
     def _follow(self, topic: str, offered: list[QoSProfile]) -> None:
         """Subscribes with the QoS that all publishers offer, if that is not so already."""

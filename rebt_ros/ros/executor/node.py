@@ -24,7 +24,7 @@ from rebt_ros.demonstration.builder import BadMessageError
 from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
 from rebt_ros.demonstration.fields import values_of
 from rebt_ros.demonstration.last_action import ActionHistory
-from rebt_ros.errors import DocumentError
+from rebt_ros.errors import DocumentError, RebtError
 from rebt_ros.live.background import Background
 from rebt_ros.live.novelty_guard import NoveltyGuard
 from rebt_ros.live.takeover import Takeover, channel_of
@@ -32,6 +32,7 @@ from rebt_ros.live.tree_inputs import Message
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.command_channels import DRIVING_QOS, CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
+from rebt_ros.ros.executor.robot_inputs import RobotInputs
 from rebt_ros.ros.executor.settings import declare_settings
 from rebt_ros.ros.executor.tree_program import Preparation, TreeProgram
 from rebt_ros.ros.graph_watch import GraphWatch
@@ -45,6 +46,9 @@ _STATE_QOS: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFOR
 
 #: Least time between two snapshots (seconds).
 _SNAPSHOT_PERIOD: Final = 0.2
+
+#: Time between two looks at what topics carry (seconds).
+_LOOK_PERIOD: Final = 0.5
 
 #: How long another thread may keep a tick waiting (seconds); Python's default is 5 ms.
 _HAND_OVER: Final = 0.0005
@@ -83,6 +87,7 @@ class ExecutorNode(Node):
         self._candidate: TreeProgram | None = None
         self._latest: dict[str, Message] = {}
         self._subscriptions_by_topic: dict[str, Subscription] = {}
+        self._robots: dict[TreeProgram, RobotInputs] = {}
         self._enabled = settings.enabled
         self._resting = True
         # Whether the robot may still do what it was told last, by the tree or by a person.
@@ -122,6 +127,7 @@ class ExecutorNode(Node):
         self.create_service(SetBool, "~/enable", self._enable)
         self._timer = self.create_timer(1.0 / self._settings.rate, self._tick, clock=self._time)
         self.create_timer(_SNAPSHOT_PERIOD, self._publish_snapshot, clock=steady)
+        self.create_timer(_LOOK_PERIOD, self._look_at_publishers, clock=steady)
         self._diagnostics = Diagnostics(self, "execution", self._report)
         self._say_who_drives()
         self.get_logger().info(
@@ -168,7 +174,26 @@ class ExecutorNode(Node):
         self._subscribe()
 
     def _check_topics(self, program: TreeProgram) -> None:
-        check_topics(self, program.inputs.topics, self._channels.topics_of(program.channels))
+        """Looks whether a program can have its topics.
+
+        Raises:
+            DocumentError: It cannot.
+        """
+        robot, commands = program.learned.robot, self._channels.topics_of(program.channels)
+        check_topics(self, () if robot else program.inputs.topics, commands)
+        if robot is None or program in self._robots:
+            return
+        try:
+            self._robots[program] = RobotInputs(
+                self,
+                robot,
+                program.learned.features,
+                program.inputs,
+                self._now,
+                partial(self._on_robot_state, program),
+            )
+        except RebtError as err:
+            raise DocumentError(str(err)) from err
 
     def _refuse(self, why: str) -> None:
         kept = "the tree before it stays" if self._program else "there is no tree yet"
@@ -200,6 +225,8 @@ class ExecutorNode(Node):
             self._candidate = None
 
     def _unheard(self, program: TreeProgram) -> list[str]:
+        if program in self._robots:
+            return self._robots[program].unheard
         return [topic for topic in program.inputs.topics if topic not in self._latest]
 
     def _install(self, program: TreeProgram) -> None:
@@ -222,7 +249,10 @@ class ExecutorNode(Node):
 
     def _subscribe(self) -> None:
         programs = [one for one in (self._program, self._candidate) if one is not None]
-        topics = {topic for one in programs for topic in one.inputs.topics}
+        for program in self._robots.keys() - set(programs):
+            self._robots.pop(program).close()
+        plain = [one for one in programs if one not in self._robots]
+        topics = {topic for one in plain for topic in one.inputs.topics}
         for topic in self._subscriptions_by_topic.keys() - topics:
             self.destroy_subscription(self._subscriptions_by_topic.pop(topic))
             self._latest.pop(topic, None)
@@ -230,6 +260,17 @@ class ExecutorNode(Node):
             self._subscriptions_by_topic[topic] = self.create_subscription(
                 Float64MultiArray, topic, partial(self._on_state, topic), _STATE_QOS
             )
+
+    def _on_robot_state(self, program: TreeProgram, topic: str) -> None:
+        """Goes on once a program has taken a message of a robot's own type."""
+        self._try_candidate()
+        if self._settings.tick_on_state and program is self._program:
+            self._tick_on(topic)
+
+    def _look_at_publishers(self) -> None:
+        for robot in self._robots.values():
+            for problem in robot.look():
+                self._watch.note(problem, waits=problem.startswith("nobody"))
 
     def _on_state(self, topic: str, message: Float64MultiArray) -> None:
         # A message may still come on a topic that no tree reads any longer.
@@ -254,6 +295,8 @@ class ExecutorNode(Node):
 
     def _accept(self, topic: str, *, quietly: bool = False) -> None:
         if self._program is None or topic not in self._program.inputs.topics:
+            return
+        if self._program in self._robots:
             return
         try:
             self._program.inputs.accept(topic, self._latest[topic])
@@ -469,6 +512,7 @@ class ExecutorNode(Node):
             ),
             *self._watch.several(commands, "commands", "stop all but one"),
             *self._watch.unheard(self._subscriptions_by_topic.values()),
+            *(problem for robot in self._robots.values() for problem in robot.look()),
             *self._watch.unread(commands),
         ]
 
