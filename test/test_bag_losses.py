@@ -230,6 +230,25 @@ def test_after_a_damaged_chunk_the_next_ones_are_read_and_no_state_is_made_up(
     assert (read.account.stated, read.account.read) == (40, 34)
 
 
+def test_no_action_is_sampled_through_missing_messages(tmp_path: Path) -> None:
+    messages = [replace(one, stamp=one.stamp * 100_000_000) for one in mcap.demonstration()]
+    path = mcap.write(tmp_path / "bag.mcap", messages, per_chunk=4)
+    whole = read_bag(path, sample_rate=20.0).demonstration
+    with path.open("rb") as file:
+        begins = [start - 9 for kind, start, _ in _records(file) if kind == 6]
+    data = bytearray(path.read_bytes())
+    data[begins[4] : begins[4] + 9] = b"\xff" * 9
+    path.write_bytes(data)
+    read = read_bag(path, sample_rate=20.0).demonstration
+    # Messages 16 to 19 are missing, which have the stamps 17 to 20.
+    expected = [
+        (stamp, state)
+        for stamp, state in zip(whole.stamps.tolist(), whole.states.tolist(), strict=True)
+        if not 1_600_000_000 <= stamp < 2_200_000_000
+    ]
+    assert list(zip(read.stamps.tolist(), read.states.tolist(), strict=True)) == expected
+
+
 def test_chunks_packed_by_other_means_are_named(tmp_path: Path) -> None:
     path = mcap.write(tmp_path / "bag.mcap", mcap.demonstration(), compression=mcap.Compression.LZ4)
     path.write_bytes(path.read_bytes().replace(b"\3\0\0\0lz4", b"\3\0\0\0br9"))

@@ -207,6 +207,13 @@ def test_files_are_told_by_what_is_in_them(tmp_path: Path, suffix: str) -> None:
         assert len(read_bag(tmp_path / f"{number}{suffix}").demonstration) == table.COUNT
 
 
+def test_bags_of_one_name_have_accounts_of_their_own(tmp_path: Path) -> None:
+    bags = [table.READERS["unfinished mcap"](tmp_path / run / "bag") for run in ("1", "2")]
+    loaded = load(bags)
+    assert list(loaded.accounts) == [str(one) for one in bags]
+    assert [note.split(":")[0] for note in loaded.notes] == [str(one) for one in bags]
+
+
 def test_names_in_a_database_may_be_no_utf8(tmp_path: Path) -> None:
     bag = table.READERS["sqlite"](tmp_path / "bag")
     (bag / table.METADATA).unlink()

@@ -201,6 +201,11 @@ class DemonstrationBuilder:
             return due
         return (self._row(stamp, channel, label, states),)
 
+    def interrupt(self) -> None:
+        """Ends all actions that are held, as messages are missing from here on."""
+        self._held.clear()
+        self._next_sample = None
+
     def _states_at(self, sent: int | None, label: str) -> tuple[tuple[float, ...], ...]:
         """The state of each topic that an action belongs to.
 

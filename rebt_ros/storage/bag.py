@@ -133,6 +133,7 @@ class Feed:
             InputError: It cannot be used, and such messages are not left out.
         """
         if topic == GAP:
+            self.builder.interrupt()
             # A topic on which nothing more comes still has its value, as far as can be known.
             self.unknown = {name for name, count in self.there.items() if self.seen[name] < count}
             return ()

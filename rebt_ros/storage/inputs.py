@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -55,9 +56,10 @@ class Loaded:
 
     demonstrations: tuple[Demonstration, ...]
     notes: tuple[str, ...]
-    """What a person should know, each led by the name of its demonstration."""
+    """What a person should know, each led by the name of its demonstration, or by its path where
+    others have the same name."""
     accounts: Mapping[str, Account] = field(default_factory=dict)
-    """Where what each demonstration's file holds went."""
+    """Where what each demonstration's file holds went, by the same names."""
     robot: RobotFile | None = None
     """Where features and actions are in messages, as the first file has it that says so."""
 
@@ -101,16 +103,26 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     _check_distinct([path for path, _ in sources])
     _check_options(options, {kind for _, kind in sources})
     reads = _with_common_features([_READERS[kind](path, options) for path, kind in sources])
+    names = _names([path for path, _ in sources], reads)
     return Loaded(
         tuple(read.demonstration for read in reads),
         tuple(
-            f"{read.demonstration.name}: {note}"
-            for read in reads
+            f"{name}: {note}"
+            for name, read in zip(names, reads, strict=True)
             for note in (*read.notes, *(read.account.notes() if read.account else ()))
         ),
-        {read.demonstration.name: read.account for read in reads if read.account},
+        {name: read.account for name, read in zip(names, reads, strict=True) if read.account},
         next((read.robot for read in reads if read.robot is not None), None),
     )
+
+
+def _names(paths: Sequence[Path], reads: Sequence[Read]) -> list[str]:
+    """What inputs are called in notes: by their paths where demonstrations share a name."""
+    counts = Counter(read.demonstration.name for read in reads)
+    return [
+        read.demonstration.name if counts[read.demonstration.name] == 1 else str(path)
+        for path, read in zip(paths, reads, strict=True)
+    ]
 
 
 def _with_common_features(reads: Sequence[Read]) -> list[Read]:
