@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import resource
 import shutil
 import sqlite3
 import subprocess
@@ -205,6 +206,27 @@ def test_files_are_told_by_what_is_in_them(tmp_path: Path, suffix: str) -> None:
         (file,) = (one for one in bag.iterdir() if one.name != table.METADATA)
         shutil.copyfile(file, tmp_path / f"{number}{suffix}")
         assert len(read_bag(tmp_path / f"{number}{suffix}").demonstration) == table.COUNT
+
+
+@pytest.mark.parametrize("suffix", [".mcap", ".db3"])
+def test_a_bag_may_have_more_files_than_can_be_open_at_once(tmp_path: Path, suffix: str) -> None:
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    most, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    count = len(os.listdir("/proc/self/fd")) + 40
+    if suffix == ".mcap":
+        mcap.write(bag / "bag_0.mcap", MESSAGES)
+    else:
+        table._database(bag / "bag_0.db3", MESSAGES).close()
+    for number in range(1, count):
+        shutil.copyfile(bag / f"bag_0{suffix}", bag / f"bag_{number}{suffix}")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (count, hard))
+    try:
+        read = read_bag(bag)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
+    assert len(read.demonstration) == 20 * count
+    assert len(read.notes) == 1
 
 
 def test_bags_of_one_name_have_accounts_of_their_own(tmp_path: Path) -> None:

@@ -240,16 +240,17 @@ def _open_plain(file: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
     with file.open("rb") as opened:
         magic = opened.read(len(sqlite.MAGIC))
     if magic.startswith(MCAP_MAGIC):
-        _open_mcap(file, name, bag, stack)
+        _open_mcap(file, name, bag)
     elif file.suffix.lower() == ".mcap" and magic != sqlite.MAGIC:
         raise ValueError(f"{file.name} does not begin like an mcap file")
     else:
         _open_sqlite(file, name, bag, stack)
 
 
-def _open_mcap(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
-    file = McapFile(stack.enter_context(path.open("rb")))
-    survey = file.survey
+def _open_mcap(path: Path, name: str, bag: BagFiles) -> None:
+    # Not all files of a bag can be open at once where there are thousands.
+    with path.open("rb") as file:
+        survey = McapFile(file).survey
     number = {}
     for channel, about in survey.channels.items():
         if about.encoding == _CDR:
@@ -261,8 +262,9 @@ def _open_mcap(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
     def read(topics: Collection[Topic]) -> Iterator[Message]:
         wanted = {channel: topic for channel, topic in number.items() if topic in topics}
         wanted[mcap.GAP] = GAP
-        for message in file.messages(wanted.keys()):
-            yield wanted[message.channel], message.stamp, message.data
+        with path.open("rb") as file:
+            for message in McapFile(file, survey).messages(wanted.keys()):
+                yield wanted[message.channel], message.stamp, message.data
 
     counts, stated = Counter[Topic](), Counter[Topic]()
     for channel, topic in number.items():

@@ -116,12 +116,13 @@ class McapFile:
 
     Args:
         file: Open for reading in binary.
+        survey: What is in it, where that is known.
     """
 
-    def __init__(self, file: BinaryIO) -> None:
+    def __init__(self, file: BinaryIO, survey: Survey | None = None) -> None:
         self._file = file
         self._schemas: dict[int, str] = {}
-        self.survey = self._surveyed()
+        self.survey = self._surveyed() if survey is None else survey
 
     def messages(self, channels: Collection[int]) -> Iterator[McapMessage]:
         """The messages of some channels by the time at which they were recorded.

@@ -51,10 +51,9 @@ class SqliteTopic:
 
 @dataclass(slots=True)
 class SqliteFile:
-    """An open file; see `opened` and `messages`."""
+    """A file; see `opened` and `messages`."""
 
     path: Path
-    connection: sqlite3.Connection
     topics: tuple[SqliteTopic, ...] = ()
     found: Counter[int] = field(default_factory=Counter)
     """Messages by the number of their topic."""
@@ -106,7 +105,11 @@ class SqliteFile:
         Raises:
             sqlite3.Error: The topics cannot be read.
         """
-        rows = self.connection.execute(
+        with contextlib.closing(_connected(self.path)) as connection:
+            self._survey(connection)
+
+    def _survey(self, connection: sqlite3.Connection) -> None:
+        rows = connection.execute(
             "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
         )
         self.topics = tuple(
@@ -123,11 +126,11 @@ class SqliteFile:
             return
         try:
             # An index may be damaged where the table is not.
-            counts = self.connection.execute(
+            counts = connection.execute(
                 "SELECT topic_id, count(*) FROM messages NOT INDEXED GROUP BY topic_id"
             )
             self.found.update({_number(number): int(count) for number, count in counts})
-            [(highest,)] = self.connection.execute("SELECT max(id) FROM messages NOT INDEXED")
+            [(highest,)] = connection.execute("SELECT max(id) FROM messages NOT INDEXED")
             if isinstance(highest, int) and highest > (count := self.found.total()):
                 # Recorders number messages from 1.
                 self.notes.append(
@@ -140,14 +143,15 @@ class SqliteFile:
 
     def _by_sqlite(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         marks = ", ".join("?" * len(numbers))
-        for number, stamp, data in self.connection.execute(
-            "SELECT topic_id, timestamp, data FROM messages NOT INDEXED "
-            f"WHERE topic_id IN ({marks}) ORDER BY timestamp, id",
-            tuple(numbers),
-        ):
-            # A number or a text there is no message; `bytes` would make one of as many zeros.
-            usable = isinstance(data, bytes) and isinstance(stamp, int)
-            yield int(number), stamp if usable else 0, data if usable else b""
+        with contextlib.closing(_connected(self.path)) as connection:
+            for number, stamp, data in connection.execute(
+                "SELECT topic_id, timestamp, data FROM messages NOT INDEXED "
+                f"WHERE topic_id IN ({marks}) ORDER BY timestamp, id",
+                tuple(numbers),
+            ):
+                # A number or a text there is no message; `bytes` would make one of as many zeros.
+                usable = isinstance(data, bytes) and isinstance(stamp, int)
+                yield int(number), stamp if usable else 0, data if usable else b""
 
     def _survey_pages(self, why: str) -> None:
         """Counts the messages on pages, as SQLite cannot read all of them."""
@@ -174,23 +178,15 @@ def opened(path: Path) -> Iterator[SqliteFile]:
         OSError: It cannot be read, or there is no room for the copy.
     """
     log = path.with_name(f"{path.name}-wal")
-    if not (log.is_file() and log.stat().st_size):
-        with _opened_plain(path) as file:
-            yield file
-        return
-    with tempfile.TemporaryDirectory() as directory:
-        copy = Path(directory, "bag.db3")
-        shutil.copyfile(path, copy)
-        note = _with_log(copy, log)
-        with _opened_plain(copy) as file:
-            file.notes += note
-            yield file
-
-
-@contextlib.contextmanager
-def _opened_plain(path: Path) -> Iterator[SqliteFile]:
-    with contextlib.closing(_connected(path)) as connection:
-        file = SqliteFile(path, connection)
+    with contextlib.ExitStack() as stack:
+        notes: list[str] = []
+        if log.is_file() and log.stat().st_size:
+            directory = stack.enter_context(tempfile.TemporaryDirectory())
+            copy = Path(directory, "bag.db3")
+            shutil.copyfile(path, copy)
+            notes, path = _with_log(copy, log), copy
+        file = SqliteFile(path, notes=notes)
+        # Each time it is read it is opened: not all files can be where there are thousands.
         file.survey()
         yield file
 
