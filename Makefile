@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench bench-driving bench-reduction bench-recorder experiment fuzz soak lint format clean
+.PHONY: help setup build demo test bench bench-driving bench-recorder experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -60,9 +60,6 @@ test: build ## Run the tests on the built package.
 bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 bench: setup ## Measure us and the limit in turn, for docs/performance.md (ARGS="--only tick" for options).
 	@PYTHONPATH=.:test:$$PYTHONPATH $(VENV_PYTHON) test/benchmarks/bench.py $(ARGS)
-
-bench-reduction: setup ## Compare the sizes of BT-Espresso's trees and ours (ARGS="..." for options).
-	@$(EXPERIMENTS) && $(VENV_PYTHON) -m rebt_ros.commands.bench_reduction "$$experiments" $(ARGS)
 
 bench-driving: setup ## Let what is learned drive, beside plain learners (ARGS="corrections", "--late 2", ...).
 	@PYTHONPATH=.:test/benchmarks:$$PYTHONPATH $(VENV_PYTHON) -m driving $(ARGS)

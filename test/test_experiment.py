@@ -16,12 +16,16 @@ from typing import Any
 
 import pytest
 
+from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands import experiment
+from rebt_ros.decision_tree.tree import DecisionTree
+from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
 from rebt_ros.errors import OptionError
 from rebt_ros.study import experiment as study_experiment
 from rebt_ros.study import workers
-from rebt_ros.study.configurations import Lost
+from rebt_ros.study.configurations import Lost, configuration_paths, read_where_possible
 from rebt_ros.study.experiment import run_experiment
+from rebt_ros.study.mode import Mode
 from rebt_ros.study.settings import Settings
 from rebt_ros.study.simulator.configuration import ExperimentConfig
 
@@ -128,7 +132,9 @@ def test_all_figures_are_written_and_printed(
         assert figures["psa"][1] == 3
         assert 0 <= figures["exact"] <= 6
         assert figures["offered"]["maximum"] > 0
-        assert {"median", "maximum", "share_reduced"} <= set(figures["node_reduction"])
+        for reduction in ("node_reduction", "node_reduction_with_inverters"):
+            assert {"median", "maximum", "share_reduced"} <= set(figures[reduction])
+        assert figures["mismatches"] == 0
         assert 0 <= figures["own_history_agreement"] <= 1
     assert found["modes"]["default"]["suggestions"]["maximum"] <= 12
     assert found["lost_configurations"] == []
@@ -210,6 +216,26 @@ def test_a_configuration_that_fails_is_lost_and_does_not_stop_the_others(
     assert "did nothing in 200 ticks" in lost["expr3"]
     assert lost["expr9"] == "ZeroDivisionError: division by zero"
     assert "expr9 is lost: ZeroDivisionError: division by zero" in capsys.readouterr().out
+
+
+def test_rows_where_a_tree_differs_from_the_decision_tree_are_counted(
+    configurations: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rebt_ros.study import running
+
+    original = running.plain_tree
+
+    def reaches_only(mode: Mode, tree: DecisionTree, main: nodes.Node) -> nodes.Node:
+        if mode is Mode.PAPER:
+            return nodes.Action("reach", DEFAULT_CHANNEL)
+        return original(mode, tree, main)
+
+    monkeypatch.setattr(running, "plain_tree", reaches_only)
+    (config, *_), _ = read_where_possible(configuration_paths(configurations))
+    result = running.run_configuration(config, SETTINGS)
+    compared = len(result.modes[Mode.PAPER].sizes)
+    assert 0 < result.modes[Mode.PAPER].mismatches < compared * result.rows
+    assert result.modes[Mode.DEFAULT].mismatches == 0
 
 
 def test_a_configuration_of_one_action_is_not_compared_and_not_lost(

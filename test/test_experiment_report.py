@@ -48,7 +48,7 @@ def subtree(number: int, repeaters: int, psa: int, **scores: Score) -> SubtreeRe
 
 def mode_result(*saved: int, right: int = 5) -> ModeResult:
     sizes = tuple(SizeComparison(Size(20, 20), Size(21, 20 - one)) for one in saved)
-    return ModeResult((LevelSizes(4, 1), LevelSizes(9, 3)), sizes, Agreement(right, 10))
+    return ModeResult((LevelSizes(4, 1), LevelSizes(9, 3)), sizes, Agreement(right, 10), 4)
 
 
 RESULT = ConfigurationResult(
@@ -130,6 +130,9 @@ def test_exact_recoveries_reductions_and_what_was_offered_are_counted() -> None:
     assert default.reductions is not None
     assert (default.reductions.median, default.reductions.maximum) == (30, 50)
     assert default.reductions.share_reduced == 100
+    assert default.with_inverters is not None
+    assert (default.with_inverters.median, default.with_inverters.share_reduced) == (-5, 0)
+    assert default.mismatches == 4
     assert default.agreement == Share(7, 10)
     assert (default.subtrees_offered.median, default.subtrees_offered.maximum) == (6.5, 9)
     assert (default.suggestions_offered.median, default.suggestions_offered.maximum) == (2, 3)

@@ -59,15 +59,6 @@ def chosen_paths(
     return tuple(kept[:limit])
 
 
-def read_configs(directory: Path) -> list[ExperimentConfig]:
-    """All configurations of a directory, in the order of the numbers in their names.
-
-    Raises:
-        InputError: There are none, or one is malformed.
-    """
-    return [parse_config(read_text(path), path.stem) for path in configuration_paths(directory)]
-
-
 def read_where_possible(
     paths: Sequence[Path],
 ) -> tuple[tuple[ExperimentConfig, ...], tuple[Lost, ...]]:

@@ -89,6 +89,10 @@ class ModeFigures:
     """The same of all subtrees, those without PSA nodes among them."""
     reductions: Reductions | None
     """None where no decision tree decides anything."""
+    with_inverters: Reductions | None
+    """The same, Inverters counted."""
+    mismatches: int
+    """Rows on which these trees do not what their decision trees do."""
     trees: int
     """Trees whose size was compared."""
     subtrees_offered: Spread
@@ -151,6 +155,10 @@ def reductions(results: Sequence[ConfigurationResult], mode: Mode) -> list[float
     return [size.reduction for result in results for size in result.modes[mode].sizes]
 
 
+def _with_inverters(results: Sequence[ConfigurationResult], mode: Mode) -> list[float]:
+    return [size.reduction_as_emitted for result in results for size in result.modes[mode].sizes]
+
+
 def mode_figures(results: Sequence[ConfigurationResult], mode: Mode) -> ModeFigures:
     """The figures of a mode.
 
@@ -183,6 +191,8 @@ def mode_figures(results: Sequence[ConfigurationResult], mode: Mode) -> ModeFigu
         psa=_share(right for has_psa, right in right_psa if has_psa),
         psa_of_all=_share(right for _, right in right_psa),
         reductions=Reductions.of(reduced) if reduced else None,
+        with_inverters=Reductions.of(_with_inverters(results, mode)) if reduced else None,
+        mismatches=sum(result.modes[mode].mismatches for result in results),
         trees=len(reduced),
         subtrees_offered=_spread(levels, "subtrees"),
         suggestions_offered=_spread(levels, "suggestions"),

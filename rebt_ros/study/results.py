@@ -86,6 +86,9 @@ class ModeResult:
     """Against BT-Espresso, without SAES, for each pruning level that decides anything."""
     agreement: Agreement | None
     """None where there are too few rows."""
+    mismatches: int
+    """Rows on which the trees whose size is compared do not what the decision tree does, of all
+    these levels; LAT is that of the demonstration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +192,7 @@ def _mode(value: dict[str, Any]) -> ModeResult:
             SizeComparison(Size(**one["baseline"]), Size(**one["size"])) for one in value["sizes"]
         ),
         None if value["agreement"] is None else Agreement(**value["agreement"]),
+        value["mismatches"],
     )
 
 

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from random import Random
 
+import numpy as np
+
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.beyond_the_paper.routines.finding import find_routines
 from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
@@ -16,6 +18,7 @@ from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, RebtError
+from rebt_ros.learning.evaluation import teacher_forced_choices
 from rebt_ros.learning.suggesting import occurrences_in
 from rebt_ros.paper.lat_occurrences import Occurrences
 from rebt_ros.study.agreement import held_out_agreements
@@ -43,12 +46,21 @@ from rebt_ros.study.words import one_line
 
 
 @dataclass(frozen=True, slots=True)
+class _Reduced:
+    """A mode's tree without SAES, against the decision tree and what BT-Espresso makes of it."""
+
+    sizes: SizeComparison
+    mismatches: int
+    """Rows on which it does not what the decision tree does."""
+
+
+@dataclass(frozen=True, slots=True)
 class _Level:
     """What a mode makes at one pruning level."""
 
     generated: tuple[ComparedTree, ...]
     offered: LevelSizes
-    sizes: SizeComparison | None
+    reduced: _Reduced | None
     """None where the decision tree decides nothing."""
 
 
@@ -94,8 +106,9 @@ def run_configuration(config: ExperimentConfig, settings: Settings) -> Configura
         modes={
             mode: ModeResult(
                 tuple(level.offered for level in made),
-                tuple(level.sizes for level in made if level.sizes is not None),
+                tuple(level.reduced.sizes for level in made if level.reduced),
                 agreements.get(mode),
+                sum(level.reduced.mismatches for level in made if level.reduced),
             )
             for mode, made in levels.items()
         },
@@ -132,16 +145,22 @@ def _level(
 ) -> _Level:
     main = main_tree(mode, trained)
     offered = offer(mode, table, trained, main, ccp_alpha, routines, occurrences)
-    # Of trees whose leaves all choose one action, BT-Espresso makes a single node as well.
-    decides = len({leaf.most_probable for _, leaf in trained.tree.paths()}) > 1
-    sizes = (
-        SizeComparison(baseline, Size.of(plain_tree(mode, trained.tree, main))) if decides else None
-    )
     return _Level(
         comparable(offered.subtrees),
         LevelSizes(len(offered.subtrees), offered.suggestions),
-        sizes,
+        _reduced(mode, table, trained, main, baseline),
     )
+
+
+def _reduced(
+    mode: Mode, table: DemonstrationTable, trained: TrainedTree, main: nodes.Node, baseline: Size
+) -> _Reduced | None:
+    # Of trees whose leaves all choose one action, BT-Espresso makes a single node as well.
+    if len({leaf.most_probable for _, leaf in trained.tree.paths()}) == 1:
+        return None
+    plain = plain_tree(mode, trained.tree, main)
+    mismatches = np.sum(teacher_forced_choices(plain, table) != trained.predict(table))
+    return _Reduced(SizeComparison(baseline, Size.of(plain)), int(mismatches))
 
 
 def _subtree(
