@@ -111,6 +111,7 @@ setup(
         "console_scripts": [
             f"check = {PACKAGE}.commands.check:main",
             f"demo = {PACKAGE}.commands.demo:main",
+            f"describe = {PACKAGE}.commands.describe:main",
             f"experiment = {PACKAGE}.commands.experiment:main",
             f"explain = {PACKAGE}.commands.explain:main",
             f"generate = {PACKAGE}.commands.generate:main",

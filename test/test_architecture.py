@@ -293,7 +293,17 @@ def test_the_core_runs_where_ros_is_not_installed() -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        *("check", "experiment", "explain", "generate", "learn", "replay", "revise", "show"),
+        *(
+            "check",
+            "describe",
+            "experiment",
+            "explain",
+            "generate",
+            "learn",
+            "replay",
+            "revise",
+            "show",
+        ),
         *("simulate", "trial"),
     ],
 )

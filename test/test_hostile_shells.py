@@ -15,6 +15,7 @@ ROWS = "".join(
 )
 COMMANDS = (
     "demo",
+    "describe",
     "experiment",
     "generate",
     "learn",
