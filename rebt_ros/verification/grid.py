@@ -103,7 +103,11 @@ class Field:
 
     def cells_of(self, boxes: Boxes) -> BoolArray:
         """Which of its cells each box has, shape (boxes, cells)."""
-        words = np.ascontiguousarray(boxes[self.words].T)
+        return self.cells_of_words(boxes[self.words])
+
+    def cells_of_words(self, words: Boxes) -> BoolArray:
+        """The same, given nothing but its words of each box, shape (words, boxes)."""
+        words = np.ascontiguousarray(words.T)
         bits = np.unpackbits(words.view(np.uint8), axis=1, bitorder="little")
         return bits[:, : self.cells].view(np.bool_)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import reduce
@@ -12,17 +12,17 @@ import numpy as np
 from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.prediction import States, history_columns
+from rebt_ros.behavior_tree.prediction import States, choose, history_columns, holds_after
 from rebt_ros.behavior_tree.runtime import AlwaysRunning, SucceedAtOnce, TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import Condition, Literal
+from rebt_ros.logic.conditions import Condition, HistoryCondition, Literal
 from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.formulas import AllOf, Formula, conditions_of
 from rebt_ros.verification.grid import Boxes, Grid
 from rebt_ros.verification.reference import Reference, of_table, of_tree
 from rebt_ros.verification.rules import Demand
-from rebt_ros.verification.states import Near, Point, Unsettled, nearest
+from rebt_ros.verification.states import Near, Point, StateFinder, Unsettled
 from rebt_ros.verification.sweep import Results, Sweep, Ticks, remembers, sweep
 
 
@@ -185,30 +185,64 @@ class _ChannelCheck:
             if demands and remembers(self.tree, self.results)
             else None
         )
-        found = tuple(self._verdict(one, grid, first, any_tick) for one in demands)
-        return ChannelProof(self.channel, grid, first, found)
+        finder = StateFinder(grid, self.learned.features, self.shown)
+        regions = [breaking(one, grid, first) for one in demands]
+        candidates = self._candidates(finder, regions)
+        commands = self._commands([one.point for one in candidates if isinstance(one, Near)])
+        found = []
+        for demand, region, near in zip(demands, regions, candidates, strict=True):
+            coverage = self._coverage(demand)
+            if isinstance(near, Near):
+                witness = self._witness(demand, near, next(commands))
+                found.append(Verdict(demand, Answer.BROKEN, witness, region, coverage=coverage))
+                continue
+            why = "" if near is None else "it depends on which differences of features there are"
+            if any_tick is not None and not why:
+                why = self._why_unknown(demand, grid, any_tick, finder)
+            answer = Answer.UNKNOWN if why else Answer.PROVEN
+            found.append(Verdict(demand, answer, why=why, coverage=coverage))
+        return ChannelProof(self.channel, grid, first, tuple(found))
 
-    def _verdict(self, demand: Demand, grid: Grid, first: Sweep, any_tick: Sweep | None) -> Verdict:
-        coverage = self._coverage(demand)
-        region = breaking(demand, grid, first)
-        why = ""
-        if region.shape[1]:
+    def _candidates(
+        self, finder: StateFinder, regions: Sequence[Boxes]
+    ) -> list[Near | Unsettled | None]:
+        """Of each region, the state that is nearest to what was shown."""
+        # All at once: what numpy does once per call then does not matter.
+        together = np.concatenate([finder.no_boxes, *regions], axis=1)
+        distances, rows = finder.closest(together)
+        found: list[Near | Unsettled | None] = []
+        end = 0
+        for region in regions:
+            start, end = end, end + region.shape[1]
             try:
-                near = nearest(region, grid, self.learned.features, self.shown)
-            except Unsettled:
-                near, why = None, "it depends on which differences of features there are"
-            if near is not None:
-                witness = self._witness(demand, near)
-                return Verdict(demand, Answer.BROKEN, witness, region, coverage=coverage)
-        if any_tick is not None and not why:
-            why = self._why_unknown(demand, grid, any_tick)
-        answer = Answer.UNKNOWN if why else Answer.PROVEN
-        return Verdict(demand, answer, why=why, coverage=coverage)
+                found.append(finder.first(region, distances[start:end], rows[start:end]))
+            except Unsettled as unsettled:
+                found.append(unsettled)
+        return found
 
-    def _why_unknown(self, demand: Demand, grid: Grid, any_tick: Sweep) -> str:
-        region = breaking(demand, grid, any_tick)
+    def _commands(self, points: Sequence[Point]) -> Iterator[nodes.Action | None]:
+        """What the tree commands in some states, asked of another program than the proof."""
+        tree = self.tree
+        if tree is None or not points:
+            return iter([None] * len(points))
+        repeats = any(isinstance(node, nodes.Repeater) for node in nodes.walk(tree))
+        if repeats or self.results is Results.REPORTED:
+            return (command_in(self.learned, self.channel, one, self.results) for one in points)
+        histories = [
+            ActionHistory() if one.before is None else one.before.history() for one in points
+        ]
+
+        def holds(condition: HistoryCondition) -> BoolArray:
+            return np.array([holds_after(one, condition) for one in histories], dtype=bool)
+
+        values = np.array([one.values for one in points]).reshape(len(points), -1)
+        actions = nodes.actions(tree)
+        chosen = choose(tree, actions, States(self.learned.features, values, holds))
+        return (actions[code] if code >= 0 else None for code in chosen.tolist())
+
+    def _why_unknown(self, demand: Demand, grid: Grid, any_tick: Sweep, finder: StateFinder) -> str:
         try:
-            if nearest(region, grid, self.learned.features, self.shown) is None:
+            if finder.nearest(breaking(demand, grid, any_tick)) is None:
                 return ""
         except Unsettled:
             pass
@@ -217,8 +251,7 @@ class _ChannelCheck:
             "it, a later one may not"
         )
 
-    def _witness(self, demand: Demand, near: Near) -> Witness:
-        command = command_in(self.learned, self.channel, near.point, self.results)
+    def _witness(self, demand: Demand, near: Near, command: nodes.Action | None) -> Witness:
         assert (command == demand.action) is (demand.forbids is not None), (demand, near, command)
         table = self.shown.table
         row = None

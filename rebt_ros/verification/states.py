@@ -11,9 +11,9 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, FloatArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.logic.conditions import Difference
+from rebt_ros.logic.conditions import Difference, Quantity
 from rebt_ros.verification.grid import ANOTHER_ACTION, LARGEST, Boxes, Field, Grid, HistoryCell
 from rebt_ros.verification.reference import Reference
 
@@ -21,8 +21,8 @@ from rebt_ros.verification.reference import Reference
 _MOST_COMBINATIONS: Final = 2_000
 #: How far inside of a range a value is chosen, as a share of all that was shown.
 _INSIDE: Final = 0.01
-#: Most boxes that each row is compared with.
-_MOST_COMPARISONS: Final = 2_000_000
+#: Boxes times rows that are compared at a time.
+_COMPARED_AT_A_TIME: Final = 2_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,76 +84,127 @@ def nearest(
     Raises:
         Unsettled: Some boxes could not be settled, and no other one has a state.
     """
-    finder = _Finder(grid, features, shown, movable)
-    unsettled = False
-    for place, row, distance in finder.candidates(boxes):
-        try:
-            point = finder.point(boxes[:, place], row)
-        except Unsettled:
-            unsettled = True
-            continue
-        if point is not None:
-            return Near(point, row, distance)
-    if unsettled:
-        raise Unsettled
-    return None
+    return StateFinder(grid, features, shown, movable).nearest(boxes)
 
 
-class _Finder:
+class StateFinder:
+    """Finds states in the boxes of one grid.
+
+    Args:
+        grid: The grid.
+        features: All features of the tree.
+        shown: What was shown.
+        movable: If given, the only feature whose value may differ from what was shown.
+    """
+
     def __init__(
-        self, grid: Grid, features: Sequence[Feature], shown: Reference, movable: str | None
+        self,
+        grid: Grid,
+        features: Sequence[Feature],
+        shown: Reference,
+        movable: str | None = None,
     ) -> None:
         self._movable = movable
+        self._tables: dict[Quantity | None, FloatArray] = {}
         self._grid = grid
         self._features = features
         self._shown = shown
         self._place = {feature.name: place for place, feature in enumerate(features)}
 
-    def candidates(self, boxes: Boxes) -> Iterator[tuple[int, int | None, float]]:
-        """The boxes with the row that is nearest to each, the nearest ones first."""
+    @property
+    def no_boxes(self) -> Boxes:
+        """None, of the grid."""
+        return self._grid.everything()[:, :0]
+
+    def nearest(self, boxes: Boxes) -> Near | None:
+        """As the function of this name."""
+        return self.first(boxes, *self.closest(boxes))
+
+    def first(self, boxes: Boxes, distances: FloatArray, rows: IntArray) -> Near | None:
+        """The state in some boxes that is nearest to its row.
+
+        Args:
+            boxes: Any number of them.
+            distances: From `closest`.
+            rows: From `closest`.
+
+        Raises:
+            Unsettled: Some boxes could not be settled, and no other one has a state.
+        """
+        unsettled = False
+        for place in np.argsort(distances, kind="stable").tolist():
+            row = int(rows[place]) if rows[place] >= 0 else None
+            try:
+                point = self.point(boxes[:, place], row)
+            except Unsettled:
+                unsettled = True
+                continue
+            if point is not None:
+                return Near(point, row, float(distances[place]))
+        if unsettled:
+            raise Unsettled
+        return None
+
+    def closest(self, boxes: Boxes) -> tuple[FloatArray, IntArray]:
+        """How far each box is from the row that is nearest to it, and which row that is.
+
+        Returns:
+            Distances, shape (boxes,), and rows, -1 where there are none, shape (boxes,).
+        """
         count = boxes.shape[1]
         if not len(self._shown):
-            yield from ((place, None, 0.0) for place in range(count))
-            return
-        most = max(1, _MOST_COMPARISONS // len(self._shown))
-        found = []
-        for place in range(min(count, most)):
-            distances = self._distances(boxes[:, place])
-            row = int(np.argmin(distances))
-            found.append((float(distances[row]), place, row))
-        for distance, place, row in sorted(found):
-            yield place, row, distance
-        yield from ((place, 0, math.inf) for place in range(most, count))
+            return np.zeros(count), np.full(count, -1)
+        distances, rows = np.empty(count), np.empty(count, dtype=np.int64)
+        at_a_time = max(1, _COMPARED_AT_A_TIME // len(self._shown))
+        for start in range(0, count, at_a_time):
+            part = slice(start, start + at_a_time)
+            all_of = self._distances(boxes[:, part])
+            rows[part] = np.argmin(all_of, axis=1)
+            distances[part] = np.min(all_of, axis=1)
+        return distances, rows
 
-    def _distances(self, box: Boxes) -> FloatArray:
-        """How far the box is from each row; differences of features do not count."""
-        total = np.zeros(len(self._shown))
-        for field, cells in self._restricted(box):
-            if isinstance(field.quantity, str):
-                column = self._place[field.quantity]
-                total += self._distances_of(field, cells, column)
+    def _distances(self, boxes: Boxes) -> FloatArray:
+        """How far boxes are from rows; differences of features do not count.
+
+        Returns:
+            Shape (boxes, rows).
+        """
+        total = np.zeros((boxes.shape[1], len(self._shown)))
+        for field in self._grid.fields:
+            if not isinstance(field.quantity, str):
+                continue
+            # Many boxes have the same cells of a field.
+            different, which = np.unique(boxes[field.words], axis=1, return_inverse=True)
+            cells = field.cells_of_words(different)
+            if len(cells) == 1 and cells.all():
+                continue
+            away = self._away(field)
+            least = np.array([away[:, its].min(axis=1, initial=np.inf) for its in cells])
+            total += least[np.asarray(which).reshape(-1)]
         return total
 
-    def _distances_of(self, field: Field, cells: BoolArray, column: int) -> FloatArray:
-        low, high = self._shown.low[:, column], self._shown.high[:, column]
+    def _away(self, field: Field) -> FloatArray:
+        """How far each row is from each cell, shape (rows, cells)."""
+        if field.quantity not in self._tables:
+            self._tables[field.quantity] = self._table(field)
+        return self._tables[field.quantity]
+
+    def _table(self, field: Field) -> FloatArray:
+        assert isinstance(field.quantity, str)
+        column = self._place[field.quantity]
+        low, high = (its[:, column, np.newaxis] for its in (self._shown.low, self._shown.high))
         missing = np.isnan(low)
         # A missing value is as far from all others as the largest from the smallest.
-        nearest_yet = np.where(missing, 0.0 if cells[-1] else 1.0, np.inf)
-        scale = self._shown.scale[column]
         if field.feature is not None and field.feature.kind is FeatureKind.CATEGORICAL:
-            codes = np.flatnonzero(cells[:-1])
-            anything = np.isinf(low)
-            same = np.isin(low, codes) | (anything & (len(codes) > 0))
-            return np.where(missing, nearest_yet, np.where(same, 0.0, 1.0))
-        for one in _ranges(field, cells):
-            if one.missing:
-                nearest_yet = np.fmin(nearest_yet, 1.0)
-            else:
-                away = np.fmax(np.fmax(one.above - high, low - one.at_most), 0.0) / scale
-                # On the lower end, which is not part of the range, it is just outside.
-                away = np.where((away == 0) & (high <= one.above), 1e-12, away)
-                nearest_yet = np.where(missing, nearest_yet, np.fmin(nearest_yet, away))
-        return nearest_yet
+            known = np.where((low == field.ends[:-1]) | np.isinf(low), 0.0, 1.0)
+        else:
+            ends = field.ends[:-1]
+            below = np.concatenate([[-np.inf], ends[:-1]])
+            known = np.fmax(np.fmax(below - high, low - ends), 0.0) / self._shown.scale[column]
+            # On the lower end, which is not part of the cell, it is just outside.
+            known = np.where((known == 0) & (high <= below), 1e-12, known)
+        known = np.where(missing, 1.0, known)
+        return np.concatenate([known, np.where(missing, 0.0, 1.0)], axis=1)
 
     def _restricted(self, box: Boxes) -> Iterator[tuple[Field, BoolArray]]:
         """The fields of which the box does not have all cells."""

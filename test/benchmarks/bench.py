@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import checking
 import learning
 import node_rows
 import reading
@@ -26,6 +27,7 @@ from harness import CHECKOUT, Figure, Settings, table, write
 ROWS: dict[str, Callable[[Settings], list[Figure]]] = {
     "tick": running.tick,
     "predict": running.predict,
+    "check": checking.check_rules,
     "bag": reading.bag,
     "recording": reading.recording,
     "rules": learning.rules,
