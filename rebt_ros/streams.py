@@ -23,6 +23,7 @@ _HANDLER = "rebt_ros.plain"
 
 def prepare() -> None:
     """Makes the standard streams take all text; to be called first of all."""
+    _open_what_is_closed()
     codecs.register_error(_HANDLER, _plain)
     sys.stdout = _ready(sys.stdout)
     sys.stderr = _ready(sys.stderr)
@@ -31,6 +32,16 @@ def prepare() -> None:
 def drop(stream: TextIO) -> None:
     """Has nothing more written to a stream, not even at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _open_what_is_closed() -> None:
+    """Gives the standard streams' numbers to nothing else, in this process and in its children."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The lowest number that is free is this one.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
 
 
 def _ready(stream: TextIO | None) -> TextIO:

@@ -20,6 +20,7 @@ from rclpy.parameter import Parameter
 from ros_processes import LATCHED, NodeProcess, Peer, values_of, wait_until
 from std_msgs.msg import String
 
+import rebt_ros
 from rebt_ros.behavior_tree.document import loads
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.demonstration import Row
@@ -55,6 +56,18 @@ def _status(peer: Peer, what: str) -> Any:
         lambda: (one := peer.diagnostics.get("learner: learning")) and what in one.message and one,
         what=f"{what!r} on /diagnostics",
     )
+
+
+def _files(directory: Path) -> dict[str, object]:
+    """All in a directory, by their names in it; where it is from is not compared."""
+    files: dict[str, object] = {
+        str(one.relative_to(directory)): one.read_bytes()
+        for one in directory.rglob("*")
+        if one.is_file()
+    }
+    summary = json.loads((directory / "summary.json").read_text(encoding="utf-8"))
+    assert len(summary.pop("inputs")) == 1
+    return files | {"summary.json": summary}
 
 
 def _is_alive(process: int) -> bool:
@@ -116,6 +129,12 @@ def test_relearn_publishes_writes_and_answers(domain: int, peer: Peer, tmp_path:
         published = _latest(peer, trees, 1)
         assert published == read_tree(tmp_path / "learned" / "tree.json")
         assert [feature.topic for feature in published.features] == ["state", "state"]
+        learner.says("summary and pictures of the tree are in")
+        rebt_ros.learn(tmp_path / "demonstrations", out=tmp_path / "offline")
+        live, offline = (_files(tmp_path / name) for name in ("learned", "offline"))
+        assert live.pop("trees/000001.json") == live["tree.json"]
+        assert live == offline
+        assert {"tree.png", "decision_tree.svg", "tree.txt"} <= live.keys()
         status = _status(peer, "Learned")
         assert values_of(status)["rows"] == "120"
         assert learner.stop() == 0
@@ -475,6 +494,7 @@ def test_a_relearn_writes_what_learn_writes_and_a_robot_in_a_namespace_has_its_o
         learner.says(f"to learn one from {tmp_path / 'demonstrations' / 'one'}")
         answer = peer.call("/one/learner/relearn")
         assert answer.success, answer.message
+        learner.says("summary and pictures of the tree are in")
     written = {one.name for one in (tmp_path / "learned" / "one").iterdir()}
     assert {"tree.json", "tree.txt", "tree.svg", "tree.dot", "summary.json", "trees"} <= written
     summary = json.loads((tmp_path / "learned" / "one" / "summary.json").read_text())

@@ -155,3 +155,26 @@ def test_a_process_that_cannot_be_started_is_an_error(
         process.ask(request_, cancelled=threading.Event())
     monkeypatch.undo()
     assert process.ask(request_, cancelled=threading.Event()).sentence
+
+
+def test_the_files_of_what_was_learned_last_are_written_once(
+    process: LearningProcess, request_: Request, tmp_path: Path
+) -> None:
+    assert process.write(tmp_path / "out") == ()
+    assert not (tmp_path / "out").exists()
+    process.ask(request_, cancelled=threading.Event())
+    process.write(tmp_path / "out")
+    written = {one.name for one in (tmp_path / "out").iterdir()}
+    assert {"tree.json", "tree.svg", "decision_tree.svg", "summary.json"} <= written
+    assert process.write(tmp_path / "again") == ()
+    assert not (tmp_path / "again").exists()
+
+
+def test_files_that_cannot_be_written_are_no_end_of_the_process(
+    process: LearningProcess, request_: Request, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    process.ask(request_, cancelled=threading.Event())
+    with pytest.raises(LearningError, match="file"):
+        process.write(tmp_path / "file")
+    assert process.ask(request_, cancelled=threading.Event()).sentence

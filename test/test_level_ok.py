@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
-from executor_examples import READS_X
+from builtin_interfaces.msg import Time
+from executor_examples import GO, READS_X, STOP, learned, where_x_is_small
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from ros_processes import LATCHED, NodeProcess, Peer
+from ros_processes import LATCHED, NodeProcess, Peer, values_of
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, Float64MultiArray, Int32, String
 
 from rebt_ros.behavior_tree.document import dumps
+from rebt_ros.behavior_tree.fingerprint import fingerprint
+from rebt_ros.simulated_robot.robot import State
+from rebt_ros.storage.recording import read_recording
 
 PROMPT = {"reorder_window": 0.0}
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -59,8 +65,56 @@ def test_a_recorder_says_that_simulated_time_does_not_come(
     with NodeProcess("recorder_node", domain, tmp_path, parameters) as recorder:
         peer.state(0.0)
         peer.action("go")
-        _warns(peer, "recorder", "waiting for /clock")
+        _warns(peer, "recorder", "action 'go' on 'action' is not recorded", "waiting for /clock")
         recorder.says("waiting for /clock")
+        report = values_of(peer.diagnostics["recorder: recording"])
+        assert (report["rows"], report["action before the first /clock"]) == ("0", "1")
+        answer = peer.call("/recorder/new_demonstration")
+        assert (answer.success, "/clock; wait for ~/ready" in answer.message) == (False, True)
+        assert "no rows were recorded" in peer.call("/recorder/record", False).message
+    assert list(tmp_path.glob("demonstrations/*")) == []
+
+
+def test_a_recorder_is_not_ready_before_simulated_time_is(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT | {"use_sim_time": True}):
+        said = peer.listen(Bool, "recorder/ready", LATCHED)
+        peer.connect(String, "action")
+        peer.state(0.0)
+        _warns(peer, "recorder", "waiting for /clock")
+        assert [one.data for one in said] == [False]
+
+        def ready() -> bool:
+            peer.publish(Clock(clock=Time(sec=5)), "/clock")
+            peer.spin_once()
+            return [one.data for one in said] == [False, True]
+
+        peer.wait_until(ready)
+        peer.action("go")
+        assert "recorded 1 row" in peer.call("/recorder/record", False).message
+    [path] = tmp_path.glob("demonstrations/*.rec")
+    assert read_recording(path).demonstration.stamps.tolist() == [5_000_000_000]
+
+
+def test_a_recorder_that_does_not_record_has_looked_at_the_graph(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT | {"recording": False}):
+        peer.state(0.0)
+        peer.node.create_publisher(String, "action", BEST_EFFORT)
+        _warns(peer, "recorder", "not recording", "offers incompatible QoS on /action")
+
+
+def test_a_finding_that_comes_back_is_logged_again(domain: int, peer: Peer, tmp_path: Path) -> None:
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT) as recorder:
+        sentence = "publishes std_msgs/msg/Int32 on /state"
+        for times in (1, 2):
+            other = peer.node.create_publisher(Int32, "state", 10)
+            _warns(peer, "recorder", sentence)
+            peer.wait_until(lambda times=times: recorder.stderr.count(sentence) == times)
+            peer.node.destroy_publisher(other)
+            peer.wait_until(lambda: sentence not in peer.diagnostics["recorder: recording"].message)
 
 
 def test_a_recorder_says_once_that_nobody_publishes_and_what_was_not_recorded(
@@ -109,9 +163,104 @@ def test_with_two_learners_all_who_are_concerned_say_so(
             executor.says("2 nodes publish trees on behavior_tree")
             for name in names:
                 _warns(peer, name, "2 nodes publish trees on behavior_tree")
+            executor.stop()
+            assert executor.stderr.count("2 nodes publish trees") == 1
         finally:
             for one in nodes:
                 one.stop()
+
+
+@pytest.mark.parametrize("name", ["one", "/two"])
+def test_an_executor_follows_the_learner_that_a_parameter_names(
+    name: str, domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    trees = {"one": READS_X, "two": learned(where_x_is_small(STOP, GO))}
+    with ExitStack() as running:
+        for other, tree in trees.items():
+            directory = tmp_path / other
+            directory.mkdir()
+            (directory / "tree.json").write_text(dumps(tree))
+            rename = ["-r", f"__node:={other}"]
+            running.enter_context(
+                NodeProcess("learner_node", domain, directory, {"output": directory}, rename)
+            )
+        for other in trees:
+            peer.wait_until(lambda other=other: f"{other}: learning" in peer.diagnostics)
+        executor = running.enter_context(
+            NodeProcess("executor_node", domain, tmp_path, {"learner": name})
+        )
+        wanted = fingerprint(dumps(trees[name.strip("/")]))
+
+        def report() -> Any:
+            return peer.diagnostics.get("executor: execution")
+
+        peer.wait_until(lambda: report() and values_of(report()).get("document") == wanted)
+        assert values_of(report())["trees from"] == f"/{name.strip('/')}/behavior_tree"
+        assert "publish trees" not in report().message
+        executor.says(f"following the trees of {name}")
+
+
+def test_an_executor_says_that_the_learner_it_should_follow_is_not_there(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("executor_node", domain, tmp_path, {"learner": "/other"}):
+        _warns(peer, "executor", "nobody publishes on /other/behavior_tree")
+
+
+def test_an_executor_says_that_trees_are_not_kept_for_it(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("executor_node", domain, tmp_path):
+        peer.node.create_publisher(String, "behavior_tree", 10)
+        _warns(peer, "executor", "/test_peer offers incompatible QoS on /behavior_tree")
+
+
+@pytest.mark.parametrize("second", ["executor", "another"])
+def test_two_executors_say_so_whatever_their_names(
+    second: str, domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    rename = ["-r", f"__node:={second}"]
+    with (
+        NodeProcess("executor_node", domain, tmp_path) as one,
+        NodeProcess("executor_node", domain, tmp_path, {}, rename) as other,
+    ):
+        names = ", ".join(sorted(("/executor", f"/{second}")))
+        for node, process in (("executor", one), (second, other)):
+            _warns(peer, node, f"2 nodes publish commands on /command ({names})")
+            process.says("2 nodes publish commands on /command")
+        for process in (one, other):
+            process.stop()
+            assert process.stderr.count("2 nodes publish commands") == 1
+
+
+def test_a_demonstrator_says_that_nobody_is_there_and_who_gets_no_actions(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("demonstrator_node", domain, tmp_path) as demonstrator:
+        _warns(peer, "demonstrator", "nobody publishes on /state", "nobody listens to /action")
+        heard = peer.listen(String, "action")
+        values = [0.0] * len(State._fields)
+
+        def answered() -> bool:
+            peer.state(*values, labels=State._fields)
+            peer.spin_once()
+            return bool(heard)
+
+        peer.wait_until(answered)
+        # One who cannot be connected is waited for, and then not any longer.
+        peer.node.create_subscription(String, "action", lambda _: None, LATCHED)
+        peer.wait_until(lambda: answered() and "are not connected" in demonstrator.stderr)
+
+
+def test_the_robots_say_who_is_missing(domain: int, peer: Peer, tmp_path: Path) -> None:
+    config = tmp_path / "config.json"
+    config.write_text('{"type_": "sequence", "child_list": [{"type_": "action", "name": "wave"}]}')
+    with (
+        NodeProcess("robot_node", domain, tmp_path, {}, ["-r", "action:=own_action"]),
+        NodeProcess("synthetic_robot_node", domain, tmp_path, {"config": config}),
+    ):
+        _warns(peer, "robot", "nobody publishes on /command", "nobody publishes on /own_action")
+        _warns(peer, "synthetic_robot", "nobody listens to /state", "nobody listens to /action")
 
 
 def test_an_executor_says_that_nobody_obeys_it(domain: int, peer: Peer, tmp_path: Path) -> None:
@@ -123,18 +272,42 @@ def test_an_executor_says_that_nobody_obeys_it(domain: int, peer: Peer, tmp_path
         _warns(peer, "executor", "nobody listens to /command")
 
 
-@pytest.mark.parametrize("node", ["executor", "recorder"])
-def test_an_empty_list_means_none_or_is_refused_in_a_sentence(
-    node: str, domain: int, peer: Peer, tmp_path: Path
+@pytest.mark.parametrize(
+    ("node", "parameter", "said"),
+    [
+        ("executor", "takeover_topics", "disabled until ~/enable is called."),
+        ("recorder", "state_fields", "recording action with state"),
+        ("learner", "units", "call ~/relearn to learn one"),
+    ],
+)
+@pytest.mark.parametrize("form", ["argument", "file"])
+def test_an_empty_list_means_none(
+    node: str, parameter: str, said: str, form: str, domain: int, tmp_path: Path
 ) -> None:
-    if node == "executor":
-        arguments = ["-p", "takeover_topics:=[]"]
-        with NodeProcess("executor_node", domain, tmp_path, {}, arguments) as process:
-            process.says("disabled until ~/enable is called.")
-            assert "not initialized" not in process.stderr
-    else:
-        with NodeProcess("recorder_node", domain, tmp_path, {}, ["-p", "rate:=[]"]) as process:
-            process.says("recording action with state")
+    file = tmp_path / "parameters.yaml"
+    file.write_text(f"{node}:\n  ros__parameters:\n    {parameter}: []\n")
+    arguments = {"argument": ["-p", f"{parameter}:=[]"], "file": ["--params-file", str(file)]}
+    with NodeProcess(f"{node}_node", domain, tmp_path, {}, arguments[form]) as process:
+        process.says(said)
+        assert "not initialized" not in process.stderr
+
+
+@pytest.mark.parametrize(
+    ("node", "parameter", "sentence"),
+    [
+        ("recorder", "state_topics", "at least one state topic and action topic"),
+        ("recorder", "action_topics", "at least one state topic and action topic"),
+        ("robot", "command_topics", "name at least one topic"),
+    ],
+)
+def test_an_empty_list_is_refused_where_there_must_be_something(
+    node: str, parameter: str, sentence: str, domain: int, tmp_path: Path
+) -> None:
+    arguments = ["-p", f"{parameter}:=[]"]
+    with NodeProcess(f"{node}_node", domain, tmp_path, {}, arguments) as process:
+        assert process.wait() == 1
+        assert sentence in process.stderr
+        assert len(process.stderr.splitlines()) == 1
 
 
 def test_a_tree_that_tests_texts_is_refused_with_the_feature(

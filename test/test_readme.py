@@ -13,6 +13,9 @@ import rebt_ros
 
 _README = Path(__file__).resolve().parents[1] / "README.md"
 
+#: Wall following of a SCITOS G5 robot (UCI Machine Learning Repository).
+_SCITOS = Path(__file__).resolve().parents[2] / "shared" / "data" / "scitos_g5_24.csv"
+
 
 def _python_blocks() -> list[str]:
     return re.findall(r"```python\n(.*?)```", _README.read_text(encoding="utf-8"), re.DOTALL)
@@ -50,3 +53,29 @@ def test_learning_and_replaying_works_as_the_readme_says(tmp_path: Path) -> None
 def test_the_policy_drives_an_environment_as_the_readme_says(tmp_path: Path) -> None:
     [program] = [one for one in _python_blocks() if "gymnasium" in one]
     assert int(_run(program, tmp_path).split()[0]) >= 100
+
+
+@pytest.mark.skipif(not _SCITOS.is_file(), reason="needs ../shared/data")
+def test_the_tree_in_the_readme_is_what_the_command_prints(tmp_path: Path) -> None:
+    shown = _README.read_text(encoding="utf-8").split("```")[1].strip()
+    command, _, excerpt = shown.partition("\n")
+    assert command.startswith("$ ros2 run rebt_ros learn scitos_g5_24.csv --no-header ")
+    program = (
+        "from rebt_ros.commands import learn\n"
+        f"learn.main([{str(_SCITOS)!r}, '--no-header', '--out', 'out'])"
+    )
+    # The sentence is wrapped in the README.
+    printed = " ".join(_run(program, tmp_path).split())
+    assert " ".join(excerpt.split()) in printed
+
+
+def test_percentages_in_the_readme_are_those_of_the_pages_that_it_names() -> None:
+    bullets = re.split(r"^- (?=\*\*)", _README.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    checked = 0
+    for bullet in bullets:
+        pages = re.findall(r"\]\((docs/\w+\.md)\)", bullet)
+        said = "".join((_README.parent / page).read_text(encoding="utf-8") for page in pages)
+        for figure in re.findall(r"(\d+) %", bullet) if pages else ():
+            assert re.search(rf"\b{figure}\b", said), (figure, pages)
+            checked += 1
+    assert checked >= 3

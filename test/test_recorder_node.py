@@ -117,7 +117,12 @@ def test_a_discarded_demonstration_leaves_no_file(domain: int, peer: Peer, tmp_p
         assert answer.success
         assert "discarded 1 row " in answer.message
         peer.action("right")
-        assert "recorded 1 row " in peer.call("/recorder/record", False).message
+        assert "recorded 1 row " in peer.call("/recorder/new_demonstration").message
+        peer.action("wrong again")
+        assert "recorded 1 row " in peer.call("/recorder/new_demonstration").message
+        assert "discarded 1 row " in peer.call("/recorder/discard_demonstration").message
+        assert "no row to discard" in peer.call("/recorder/discard_demonstration").message
+        assert "1 row in all" in peer.call("/recorder/record", False).message
         assert not peer.call("/recorder/discard_demonstration").success
         assert not peer.call("/recorder/new_demonstration").success
     (demonstration,) = _recorded(tmp_path / "demonstrations")

@@ -188,6 +188,13 @@ def test_a_discarded_recording_is_removed(tmp_path):
         writer.write(ROWS[0])
 
 
+def test_a_recording_that_has_ended_is_removed_as_well(tmp_path):
+    with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:
+        writer.write(ROWS[0])
+    writer.discard()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_recording_that_is_set_aside_is_kept_and_passed_over(tmp_path):
     kept = written(tmp_path)
     with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:

@@ -444,6 +444,56 @@ def test_nobody_has_to_show_what_failed(end: str) -> None:
     assert desk.actions() == [(TAKEOVER, ["go"], "")]
 
 
+def test_what_has_just_ended_is_discarded_where_nothing_was_recorded_since() -> None:
+    desk = desk_with_state()
+    for label in ("kept", "wrong"):
+        desk.session.act(2, "action", label)
+        assert desk.session.renew(3).success
+    answer = desk.session.discard(4)
+    assert (answer.success, answer.message) == (
+        True,
+        "discarded 1 row in file; a new demonstration has begun.",
+    )
+    assert desk.session.rows == 1
+    # A second call does not take what was kept before.
+    answer = desk.session.discard(5)
+    assert (answer.success, "there is no row to discard" in answer.message) == (False, True)
+    assert [end for _, _, end in desk.actions()] == ["closed", "discarded"]
+
+
+def test_what_failed_is_shown_again_where_it_is_discarded_after_its_end() -> None:
+    desk = desk_with_state()
+    desk.session.fail(2)
+    desk.session.act(3, "action", "wrong")
+    desk.session.renew(4)
+    assert desk.session.discard(5).success
+    assert desk.session.awaited
+    desk.session.act(6, "action", "right")
+    assert desk.actions() == [(FAILED, ["wrong"], "discarded"), (FAILED, ["right"], "")]
+
+
+@pytest.mark.parametrize("begin", ["fail", "start"])
+def test_what_ended_before_something_else_began_stays(begin: str) -> None:
+    desk = desk_with_state()
+    desk.session.act(2, "action", "go")
+    if begin == "start":
+        desk.session.stop(3)
+    getattr(desk.session, begin)(4)
+    assert not desk.session.discard(5).success
+    assert [end for _, _, end in desk.actions()] == ["closed"]
+
+
+def test_what_ended_last_is_named_where_nothing_is_recorded() -> None:
+    desk = desk_with_state()
+    desk.session.act(2, "action", "go")
+    desk.session.stop(3)
+    answer = desk.session.discard(4)
+    assert (answer.success, answer.message) == (
+        False,
+        "not recording: the one that ended last is file, a file that you can delete.",
+    )
+
+
 def test_what_was_shown_badly_of_what_failed_is_discarded_and_shown_again() -> None:
     desk = desk_with_state()
     desk.session.fail(2)

@@ -39,6 +39,7 @@ from rebt_ros.commands.shell import aligned, directory, parse, run, use_color
 from rebt_ros.drawing.svg import render_svg
 from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import RebtError
+from rebt_ros.ros.log_files import arguments_for_logging
 from rebt_ros.simulated_robot.demonstrator import ENOUGH
 from rebt_ros.storage.atomic import write_text_atomically
 
@@ -162,7 +163,7 @@ def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
 
 @contextlib.contextmanager
 def _person(processes: dict[str, subprocess.Popen[bytes]]) -> Iterator[Person]:
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=arguments_for_logging(sys.argv), signal_handler_options=SignalHandlerOptions.NO)
     try:
         person = Person(processes)
         try:

@@ -1,8 +1,8 @@
 """Learning in a process of its own, so that the node answers, and ends, whatever happens there.
 
-The node's side.  It writes one JSON line per request to the process's standard input and reads JSON
-lines from its standard output: progress, as often as there is any, and then one reply.  The other
-side is `rebt_ros.live.learning_worker`.  Both need no ROS.
+The node's side.  It writes one JSON line per request, or call for files, to the process's standard
+input and reads JSON lines from its standard output: progress, as often as there is any, and then
+one reply.  The other side is `rebt_ros.live.learning_worker`.  Both need no ROS.
 """
 
 from __future__ import annotations
@@ -23,6 +23,12 @@ import rebt_ros
 from rebt_ros.errors import RebtError
 
 _WORKER: Final = "rebt_ros.live.learning_worker"
+
+#: What asks for the files of what was learned last: their directory, in place of a request.
+_WRITE: Final = "write"
+
+#: How long that may take (seconds): fonts may have to be looked for first.
+_DRAWING: Final = 120.0
 
 #: How long a process that has closed its output may take to end (seconds).
 _LAST_BREATH: Final = 5.0
@@ -70,8 +76,6 @@ class Lesson:
     """How well it may do, for /diagnostics."""
     agreement: float | None = None
     """With the held-out rows, after its own choices; None where none were held out."""
-    files: Mapping[str, str] = field(default_factory=dict)
-    """What else is to be written beside the tree, by name: pictures, text and the summary."""
     rival: float | None = None
     """The same of the tree that is published, on the same rows; None where it cannot be told."""
 
@@ -90,12 +94,13 @@ class LearningCancelledError(LearningError):
 class LearningProcess:
     """Starts the process and speaks to it.
 
-    One thread at a time may ask; any thread may cancel and close.
+    Any thread may ask, and waits for those that asked before; any may cancel and close.
     """
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
+        self._turn = threading.Lock()
         # What follows is guarded by the lock.
         self._closed = False
         self._asked = False
@@ -139,14 +144,56 @@ class LearningProcess:
             LearningError: The demonstrations or options cannot be used, it took too long, or the
                 process ended.
         """
+        late = LearningError(
+            f"learning took longer than relearn_timeout ({limit:g} s) and was stopped: "
+            "allow more time or learn from fewer rows."
+            if limit is not None
+            else ""
+        )
+        return Lesson(**self._ask(asdict(request), cancelled, limit, late, progress))
+
+    def write(self, directory: Path) -> tuple[str, ...]:
+        """Writes what was learned last as the command `learn` does, pictures included.
+
+        Returns:
+            Notes on what could not be made; no full stops.
+
+        Raises:
+            LearningError: It cannot be written, took too long, or the process ended.
+        """
+        late = LearningError(f"drawing took longer than {_DRAWING:g} s and was stopped.")
+        message = {_WRITE: str(directory)}
+        reply = self._ask(message, threading.Event(), _DRAWING, late, lambda progress: None)
+        return tuple(reply["notes"])
+
+    def _ask(
+        self,
+        message: Mapping[str, Any],
+        cancelled: threading.Event,
+        limit: float | None,
+        late: LearningError,
+        progress: Callable[[Progress], None],
+    ) -> dict[str, Any]:
+        """The reply to a message."""
+        with self._turn:
+            return self._ask_in_turn(message, cancelled, limit, late, progress)
+
+    def _ask_in_turn(
+        self,
+        message: Mapping[str, Any],
+        cancelled: threading.Event,
+        limit: float | None,
+        late: LearningError,
+        progress: Callable[[Progress], None],
+    ) -> dict[str, Any]:
         with self._lock:
             if cancelled.is_set():
                 raise LearningCancelledError
             process = self._started()
             self._asked, self._stopped = True, None
         try:
-            with self._limited(limit):
-                reply = _converse(process, request, progress)
+            with self._limited(limit, late):
+                reply = _converse(process, message, progress)
         except Exception:
             # What it still says must not be taken for the next reply.
             with self._lock:
@@ -165,7 +212,7 @@ class LearningProcess:
             )
         if "error" in reply:
             raise LearningError(reply["error"])
-        return Lesson(**reply)
+        return reply
 
     def cancel(self) -> bool:
         """Ends the process if it is learning, and whoever asked it is told so.
@@ -215,16 +262,12 @@ class LearningProcess:
         return self._process
 
     @contextlib.contextmanager
-    def _limited(self, limit: float | None) -> Iterator[None]:
+    def _limited(self, limit: float | None, late: LearningError) -> Iterator[None]:
         """Ends the process where the block takes longer."""
         if limit is None:
             yield
             return
-        error = LearningError(
-            f"learning took longer than relearn_timeout ({limit:g} s) and was stopped: "
-            "allow more time or learn from fewer rows."
-        )
-        timer = threading.Timer(limit, self._stop, [error])
+        timer = threading.Timer(limit, self._stop, [late])
         timer.daemon = True
         timer.start()
         try:
@@ -243,13 +286,15 @@ class LearningProcess:
 
 
 def _converse(
-    process: subprocess.Popen[bytes], request: Request, progress: Callable[[Progress], None]
+    process: subprocess.Popen[bytes],
+    message: Mapping[str, Any],
+    progress: Callable[[Progress], None],
 ) -> dict[str, Any] | None:
-    """The reply to a request; None where the process ended, or spoke nonsense, before it."""
+    """The reply to a message; None where the process ended, or spoke nonsense, before it."""
     assert process.stdin is not None
     assert process.stdout is not None
     try:
-        process.stdin.write(json.dumps(asdict(request)).encode() + b"\n")
+        process.stdin.write(json.dumps(message).encode() + b"\n")
         process.stdin.flush()
         for line in process.stdout:
             said = json.loads(line)

@@ -14,7 +14,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rebt_ros.behavior_tree.learned_tree import LearnedTree
     from rebt_ros.demonstration.demonstration import Demonstration
     from rebt_ros.learning.learning import Learning
+    from rebt_ros.learning.options import LearnOptions
     from rebt_ros.offline.result import OfflineLearning
 
 #: Of all the work, what reading the recordings is.
@@ -40,6 +41,16 @@ _OUT_OF_MEMORY_SCORE: Final = "500"
 _SET_PARENT_DEATH_SIGNAL: Final = 1
 
 Tell = Callable[[Progress], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """What was learned, for the node and for the files."""
+
+    lesson: Lesson
+    result: OfflineLearning
+    demonstrations: str
+    options: LearnOptions
 
 
 def main(node: int) -> None:
@@ -62,8 +73,9 @@ def main(node: int) -> None:
             os._exit(0)
 
     _warm_up()
+    learned: list[Learned] = []
     for line in sys.stdin.buffer:
-        say(_reply(line, lambda progress: say(asdict(progress))))
+        say(_reply(line, learned, lambda progress: say(asdict(progress))))
 
 
 def _end_with(node: int) -> None:
@@ -94,9 +106,21 @@ def _warm_up() -> None:
         return
 
 
-def _reply(line: bytes, tell: Tell) -> dict[str, Any]:
+def _reply(line: bytes, learned: list[Learned], tell: Tell) -> dict[str, Any]:
+    """The reply to a line.
+
+    Args:
+        line: A request, or a call for the files of what was learned last.
+        learned: What was learned last, until its files are written: it may be large.
+        tell: Told how far a request is.
+    """
     try:
-        return asdict(learn(Request(**json.loads(line)), tell))
+        message = json.loads(line)
+        if "write" in message:
+            return {"notes": write(learned.pop(), Path(message["write"])) if learned else []}
+        learned.clear()
+        learned.append(learn(Request(**message), tell))
+        return asdict(learned[0].lesson)
     except RebtError as err:
         return {"error": str(err)}
     except ImportError as err:
@@ -111,7 +135,7 @@ def _reply(line: bytes, tell: Tell) -> dict[str, Any]:
         }
 
 
-def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
+def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
     """Learns from all recordings of a directory, in this process.
 
     Args:
@@ -177,7 +201,9 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
     sentences = [f"{channel}{one.in_short()}" for channel, one in led.items() if one.in_short()]
     if mended:
         sentences.append(f"Guards make it keep its rules: {mended}.")
-    return Lesson(
+    accounts = {read.demonstration.name: read.account for read in reads if read.account}
+    result = OfflineLearning(learned, learnings, tuple(notes), accounts)
+    lesson = Lesson(
         dumps(learned),
         " ".join((pipeline.summary_sentence(learned), *sentences)),
         notes,
@@ -187,9 +213,9 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Lesson:
             for name, value in one.figures().items()
         },
         learned.provenance.figures.own_history_agreement,
-        _files(OfflineLearning(learned, learnings, tuple(notes))),
         _agreement_of(request.published, learnings),
     )
+    return Learned(lesson, result, request.demonstrations, options)
 
 
 def _ruled(
@@ -221,20 +247,17 @@ def _ruled(
     return ruled.learned, ruled.mended
 
 
-def _files(result: OfflineLearning) -> dict[str, str]:
-    """What `learn` writes beside the tree, but for PNG files."""
-    from rebt_ros.drawing.dot import render_dot
-    from rebt_ros.drawing.svg import render_svg
-    from rebt_ros.drawing.text import render_text
-    from rebt_ros.offline.result import summarize
+def write(learned: Learned, directory: Path) -> tuple[str, ...]:
+    """Writes what the command `learn` does; returns notes on what could not be made.
 
-    summary = summarize(result) | {"notes": list(result.notes)}
-    return {
-        "tree.txt": render_text(result.learned),
-        "tree.svg": render_svg(result.learned),
-        "tree.dot": render_dot(result.learned),
-        "summary.json": json.dumps(summary, indent=2, ensure_ascii=False) + "\n",
-    }
+    Raises:
+        StorageError: A file cannot be written.
+    """
+    from rebt_ros.offline.learning_from_files import write_files
+
+    before = learned.result.notes
+    inputs = [learned.demonstrations]
+    return write_files(directory, learned.result, inputs, learned.options).notes[len(before) :]
 
 
 def _agreement_of(document: str, learnings: Sequence[Learning]) -> float | None:

@@ -48,7 +48,7 @@ class Writer(Protocol):
         """Ends the file, and keeps it where it is not learned from."""
 
     def discard(self) -> None:
-        """Removes the file."""
+        """Removes the file, also where it has ended."""
 
 
 class Answer(NamedTuple):
@@ -56,6 +56,11 @@ class Answer(NamedTuple):
 
     success: bool
     message: str
+
+
+class _Ended(NamedTuple):
+    writer: Writer
+    origin: Origin
 
 
 class _Message(NamedTuple):
@@ -114,6 +119,8 @@ class RecordingSession:
         self._held: dict[str, str] = {}
         self._builder: DemonstrationBuilder | None = None
         self._writer: Writer | None = None
+        # The demonstration that ended last, as long as it may be meant to be thrown away.
+        self._ended: _Ended | None = None
         self._retry_at = -math.inf
         self.origin = Origin.DEMONSTRATION
         """Why the demonstration under way, or the one that ended last, is or was shown."""
@@ -196,6 +203,7 @@ class RecordingSession:
             return Answer(True, "already recording.")
         # States were not taken since they were added last.
         self._recent.clear()
+        self._ended = None
         self._begin(stamp)
         return Answer(True, "recording: the demonstration's file is opened at its first action.")
 
@@ -236,6 +244,8 @@ class RecordingSession:
             # States were not taken since they were added last.
             self._recent.clear()
             ended = Answer(True, "recording.")
+        # It was right until it failed.
+        self._ended = None
         self._await(stamp)
         # Soon after a takeover it drives again.
         disable = "disable the executor, " if self._watch.driven or taken_over else ""
@@ -246,19 +256,29 @@ class RecordingSession:
         )
 
     def discard(self, stamp: int) -> Answer:
-        """Throws the demonstration under way away and begins the next one."""
+        """Throws the demonstration under way away and begins the next one.
+
+        Where it has no row yet, the one that ended just before is meant.  What ended before that
+        stays: who calls this twice loses one demonstration, not two.
+        """
         if not self.recording:
-            return Answer(
-                False,
-                "not recording: a demonstration that has ended is a file that you can delete.",
+            which = (
+                f"the one that ended last is {self._ended.writer.path}, a file"
+                if self._ended is not None
+                else "a demonstration that has ended is a file"
             )
+            return Answer(False, f"not recording: {which} that you can delete.")
+        ended, self._ended = self._ended, None
         writer, self._writer = self._writer, None
-        if self.origin is Origin.FAILED:
+        origin = self.origin
+        if writer is None and ended is not None:
+            writer, origin = ended
+        if origin is Origin.FAILED:
             self._await(stamp)
         else:
             self._begin(stamp)
         if writer is None:
-            return Answer(True, "there was no row to discard; a new demonstration has begun.")
+            return Answer(False, "there is no row to discard; a new demonstration has begun.")
         try:
             rows = writer.rows
             writer.discard()
@@ -329,6 +349,8 @@ class RecordingSession:
         except RebtError as err:
             self.failure = str(err)
             return Answer(False, str(err))
+        if not aside:
+            self._ended = _Ended(writer, self.origin)
         rows = f"{_count(writer.rows)} in {writer.path}"
         if aside:
             return Answer(True, f"the takeover did not help and is set aside: {rows}.")

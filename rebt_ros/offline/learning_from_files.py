@@ -88,10 +88,39 @@ def learn(
     result = OfflineLearning(learned, learnings, notes, loaded.accounts)
     if out is not None:
         writing = _part(progress, _LEARNING_SHARE, 1.0)
-        missing = _write_trees(Path(out), result, options, most_levels if levels else 0, writing)
-        result = replace(result, notes=(*notes, *missing))
-        write_summary(Path(out), result, [str(one) for one in paths], options)
+        most = most_levels if levels else 0
+        result = write_files(Path(out), result, paths, options, most, writing)
     progress("done", 1.0)
+    return result
+
+
+def write_files(
+    directory: Path,
+    result: OfflineLearning,
+    inputs: Sequence[str | Path],
+    options: LearnOptions,
+    most_levels: int = 0,
+    progress: Progress = lambda stage, share: None,
+) -> OfflineLearning:
+    """Writes all files of a learned tree; see `learn`.
+
+    Args:
+        directory: Where to.
+        result: What was learned.
+        inputs: What from, for the summary.
+        options: How.
+        most_levels: So many pruning levels at most; 0 for none.
+        progress: Told what is being done and which share of the work is behind.
+
+    Returns:
+        The same, with notes on what could not be made.
+
+    Raises:
+        StorageError: A file cannot be written.
+    """
+    missing = _write_trees(directory, result, options, most_levels, progress)
+    result = replace(result, notes=(*result.notes, *missing))
+    write_summary(directory, result, list(map(str, inputs)), options)
     return result
 
 

@@ -4,20 +4,38 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Final
 
-from rclpy.clock import ROSClock
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from rebt_ros.ros.node_clock import simulated_time
+
 #: How long a node may wait for others before it says so in its log (seconds).
-_PATIENCE = 5.0
+_PATIENCE: Final = 5.0
+
+#: Who has opened an endpoint becomes known later than the endpoint, or never without ROS.
+_UNKNOWN: Final = "an unknown node"
+
+#: An endpoint's id begins with that of its process; nodes in different ones may have equal names.
+_PROCESS: Final = slice(0, 12)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something that is wrong."""
+
+    sentence: str
+    """Without a full stop."""
+    waits: bool
+    """Whether it may well pass by itself, so that the log can wait."""
 
 
 class GraphWatch:
-    """Finds what is wrong, and logs each finding once.
+    """Finds what is wrong.
 
     Args:
         node: The node that it is about.
@@ -28,90 +46,98 @@ class GraphWatch:
         self._since: dict[str, float] = {}
         self._logged: set[str] = set()
 
-    def unheard(self, subscriptions: Iterable[Subscription]) -> list[str]:
-        """Why subscriptions hear nothing, or not all; none where nothing is wrong."""
-        return self._noted(
-            (sentence, waits) for one in subscriptions for sentence, waits in self._about(one)
-        )
-
-    def several(self, topics: Iterable[str], what: str, advice: str) -> list[str]:
-        """Topics on which several nodes publish though one should.
+    def say(self, findings: Iterable[Finding]) -> list[str]:
+        """Logs what is new, or has waited in vain for long enough; once, until it comes back.
 
         Args:
-            topics: Their names.
+            findings: All that is wrong now.
+
+        Returns:
+            Their sentences, in the same order.
+        """
+        now = time.monotonic()
+        waiting = {one.sentence: one.waits for one in findings}
+        self._since = {one: self._since.get(one, now) for one in waiting}
+        self._logged.intersection_update(waiting)
+        for sentence, waits in waiting.items():
+            patience = _PATIENCE if waits else 0.0
+            if sentence not in self._logged and now - self._since[sentence] >= patience:
+                self._logged.add(sentence)
+                self._node.get_logger().warning(f"{sentence}.")
+        return list(waiting)
+
+    def unheard(self, subscriptions: Iterable[Subscription]) -> Iterator[Finding]:
+        """Why subscriptions hear nothing, or not all."""
+        for one in subscriptions:
+            if not self._publishers(one.topic_name):
+                yield Finding(f"nobody publishes on {one.topic_name}", waits=True)
+            yield from self.misfits([one])
+
+    def misfits(self, subscriptions: Iterable[Subscription]) -> Iterator[Finding]:
+        """Publishers that subscriptions cannot hear."""
+        for subscription in subscriptions:
+            topic, wanted = subscription.topic_name, _type_of(subscription)
+            for one in self._publishers(topic):
+                if one.topic_type != wanted:
+                    name = _name(one)
+                    yield Finding(
+                        f"{name} publishes {one.topic_type} on {topic}, not {wanted}",
+                        waits=name == _UNKNOWN,
+                    )
+                    continue
+                fit, reason = qos_check_compatible(one.qos_profile, subscription.qos_profile)
+                if fit == QoSCompatibility.ERROR:
+                    reason = reason.strip().rstrip(";").removeprefix("ERROR: ")
+                    name = _name(one)
+                    yield Finding(
+                        f"{name} offers incompatible QoS on {topic}, and none of its messages is "
+                        f"received ({reason})",
+                        waits=name == _UNKNOWN,
+                    )
+
+    def several(self, topic: str, what: str, advice: str) -> Iterator[Finding]:
+        """That several nodes publish where a single one should.
+
+        Args:
+            topic: Name of the topic.
             what: What is published there, in the plural.
             advice: What helps.
         """
-        found = []
-        for topic in topics:
-            names = sorted(map(_name, self._node.get_publishers_info_by_topic(self._full(topic))))
-            if len(names) > 1:
-                sentence = f"{len(names)} nodes publish {what} on {topic} ({', '.join(names)})"
-                found.append((f"{sentence}: {advice}", False))
-        return self._noted(found)
+        names = self.publishing(topic)
+        if len(names) > 1:
+            who = ", ".join(names)
+            yield Finding(
+                f"{len(names)} nodes publish {what} on {topic} ({who}): {advice}",
+                waits=_UNKNOWN in names,
+            )
 
-    def unread(self, topics: Iterable[str]) -> list[str]:
+    def publishing(self, topic: str) -> list[str]:
+        """The full names of the nodes that publish on a topic, sorted; equal names may recur."""
+        nodes = {(bytes(one.endpoint_gid[_PROCESS]), _name(one)) for one in self._publishers(topic)}
+        return sorted(name for _, name in nodes)
+
+    def unread(self, topics: Iterable[str]) -> Iterator[Finding]:
         """Topics to which nobody listens."""
-        return self._noted(
-            (f"nobody listens to {topic}", True)
-            for topic in topics
-            if not self._node.count_subscribers(topic)
-        )
+        for topic in topics:
+            if not self._node.count_subscribers(topic):
+                yield Finding(f"nobody listens to {topic}", waits=True)
 
-    def timeless(self) -> list[str]:
+    def timeless(self) -> Iterator[Finding]:
         """That simulated time does not come, where it is in use."""
-        clock = self._node.get_clock()
-        simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
-        waits = simulated and clock.now().nanoseconds == 0
-        sentence = "use_sim_time is set, and waiting for /clock: start the simulator, or unset it"
-        return self._noted([(sentence, True)] if waits else [])
+        if simulated_time(self._node) == 0:
+            yield Finding(
+                "use_sim_time is set, and waiting for /clock: start the simulator, or unset it",
+                waits=True,
+            )
 
-    def note(self, sentence: str, *, waits: bool) -> None:
-        """Logs a finding of somebody else, once.
-
-        Args:
-            sentence: Without a full stop.
-            waits: Whether it may well change, so that it is logged only after a while.
-        """
-        self._noted([(sentence, waits)])
-
-    def _about(self, subscription: Subscription) -> Iterator[tuple[str, bool]]:
-        """What is wrong with it, and whether that may well change."""
-        topic = subscription.topic_name
-        publishers = self._node.get_publishers_info_by_topic(topic)
-        if not publishers:
-            yield f"nobody publishes on {topic}", True
-        wanted = _type_of(subscription)
-        for one in publishers:
-            if one.topic_type != wanted:
-                yield f"{_name(one)} publishes {one.topic_type} on {topic}, not {wanted}", False
-                continue
-            fit, reason = qos_check_compatible(one.qos_profile, subscription.qos_profile)
-            if fit == QoSCompatibility.ERROR:
-                reason = reason.strip().rstrip(";").removeprefix("ERROR: ")
-                yield (
-                    f"{_name(one)} offers incompatible QoS on {topic}, and none of its messages is "
-                    f"received ({reason})",
-                    False,
-                )
-
-    def _noted(self, findings: Iterable[tuple[str, bool]]) -> list[str]:
-        """The findings; logs those that are new, or that waited in vain for long enough."""
-        now = time.monotonic()
-        sentences = []
-        for sentence, waits in findings:
-            sentences.append(sentence)
-            began = self._since.setdefault(sentence, now)
-            if sentence not in self._logged and now - began >= (_PATIENCE if waits else 0.0):
-                self._logged.add(sentence)
-                self._node.get_logger().warning(f"{sentence}.")
-        return sentences
-
-    def _full(self, topic: str) -> str:
-        return str(self._node.resolve_topic_name(topic))
+    def _publishers(self, topic: str) -> list[TopicEndpointInfo]:
+        full = str(self._node.resolve_topic_name(topic))
+        return list(self._node.get_publishers_info_by_topic(full))
 
 
 def _name(endpoint: TopicEndpointInfo) -> str:
+    if "_NODE_NAME_UNKNOWN_" in endpoint.node_name:
+        return _UNKNOWN
     return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
 
 

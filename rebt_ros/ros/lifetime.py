@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import rclpy
@@ -33,6 +34,7 @@ from rclpy.utilities import ok, remove_ros_args, try_shutdown
 
 from rebt_ros.errors import RebtError
 from rebt_ros.ros.entry import STOP_SIGNALS
+from rebt_ros.ros.log_files import arguments_for_logging
 
 #: What a user can get wrong with a node's arguments, parameters and remappings.
 _WRONG_START = (
@@ -62,9 +64,13 @@ def run(factory: Callable[[], Node], args: list[str] | None = None, *, threads: 
             sentence on standard error says why.
     """
     with _noted_signals() as stopped:
-        _answer_other_arguments(sys.argv if args is None else args)
+        given = sys.argv if args is None else args
+        _answer_other_arguments(given)
+        _refuse_what_ros_cannot_write(given)
         try:
-            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+            rclpy.init(
+                args=arguments_for_logging(given), signal_handler_options=SignalHandlerOptions.NO
+            )
         except Exception as err:
             _give_up(f"these arguments are not understood: {_first_sentence(err)}", err)
         try:
@@ -92,6 +98,23 @@ def _answer_other_arguments(args: list[str]) -> None:
         raise SystemExit(0)
     if others:
         _give_up(f"the argument {others[0]!r} is not understood; usage: {usage}.", None)
+
+
+def _refuse_what_ros_cannot_write(args: Sequence[str]) -> None:
+    """Refuses paths that can stand in no log and no answer: ROS takes nothing but UTF-8."""
+    texts = list(args)
+    with suppress(OSError, RuntimeError):
+        texts += [os.getcwd(), str(Path.home())]
+    for text in texts:
+        try:
+            text.encode("utf-8")
+        except UnicodeEncodeError:
+            spelt = text.encode("utf-8", "backslashreplace").decode("utf-8")
+            _give_up(
+                f"{spelt!r} cannot be read as {sys.getfilesystemencoding()}, and ROS needs UTF-8: "
+                "set PYTHONUTF8=1, or LC_ALL=C.UTF-8, or take another name.",
+                None,
+            )
 
 
 def _live(factory: Callable[[], Node], threads: int, stopped: Callable[[], bool]) -> None:

@@ -6,7 +6,9 @@ instead of being ignored.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -36,6 +38,9 @@ _TYPES = {
     list: "a list of texts",
 }
 
+#: Parameters that rclpy itself declares once it opens what they are about.
+_BUILT_IN = "qos_overrides./clock."
+
 
 class Parameters:
     """Declares parameters of a node; every method returns a function that reads the value.
@@ -46,6 +51,7 @@ class Parameters:
 
     def __init__(self, node: Node) -> None:
         self._node = node
+        self._declared: list[str] = []
         self._choices: dict[str, tuple[str, ...]] = {}
         node.add_on_set_parameters_callback(self._refuse_other_choices)
 
@@ -126,7 +132,27 @@ class Parameters:
         path()
         return path
 
+    def refuse_others(self) -> None:
+        """Refuses what the node was started with and nobody has declared, such as mistyped names.
+
+        Raises:
+            OptionError: There is such a parameter.
+        """
+        # rclpy has no public way to see them.
+        for name in self._node._parameter_overrides:
+            if self._node.has_parameter(name) or name.startswith(_BUILT_IN):
+                continue
+            close = get_close_matches(name, self._declared, n=1)
+            advice = (
+                f"did you mean {close[0]!r}?"
+                if close
+                else f"there are {', '.join(sorted(self._declared))}; in a parameter file, what "
+                "stands under /** is for every node."
+            )
+            raise OptionError(f"there is no parameter {name!r}: {advice}")
+
     def _declare(self, name: str, default: T, descriptor: ParameterDescriptor) -> Callable[[], T]:
+        self._declared.append(name)
         try:
             self._node.declare_parameter(name, default, descriptor)
         except InvalidParameterTypeException as err:
@@ -152,7 +178,8 @@ class Parameters:
 
     def _started_with(self, name: str) -> Any:
         # rclpy has no public way to see a value that it refused.
-        return self._node._parameter_overrides[name].value
+        value = self._node._parameter_overrides[name].value
+        return list(value) if isinstance(value, array) else value
 
     def _refuse_other_choices(self, parameters: list[Parameter]) -> SetParametersResult:
         for one in parameters:

@@ -14,6 +14,7 @@ from rebt_ros.errors import RebtError
 from rebt_ros.robot_file.binding import BoundTopic, bind
 from rebt_ros.robot_file.reading import read_robot_file
 from rebt_ros.robot_file.robot_file import RobotFile
+from rebt_ros.ros.graph_watch import Finding
 from rebt_ros.ros.message_types import installed, message_class
 from rebt_ros.ros.parameters import Parameters, at_home
 
@@ -81,11 +82,11 @@ class RobotTopics:
         """Whether it is known what all topics carry."""
         return len(self.bound) == len(self._topics)
 
-    def look(self) -> list[str]:
+    def look(self) -> list[Finding]:
         """Looks at who publishes; to be called every now and then.
 
         Returns:
-            What is wrong, one sentence without a full stop for each topic at fault.
+            What is wrong, one finding for each topic at fault.
         """
         for topic in self._topics:
             publishers = self._node.get_publishers_info_by_topic(self._full(topic))
@@ -96,9 +97,9 @@ class RobotTopics:
             if topic in self.bound:
                 self._try_to_follow(topic, [one.qos_profile for one in publishers])
         return [
-            *self._problems.values(),
+            *(Finding(one, waits=False) for one in self._problems.values()),
             *(
-                f"nobody publishes on {topic}"
+                Finding(f"nobody publishes on {topic}", waits=True)
                 for topic in self._topics
                 if topic not in self.bound and topic not in self._problems
             ),

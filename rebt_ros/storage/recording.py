@@ -191,16 +191,15 @@ class RecordingWriter:
         self.path = aside
 
     def discard(self) -> None:
-        """Ends the recording and removes its file.
+        """Ends the recording and removes its file; one that has ended is removed as well.
 
         Raises:
             RecordingError: The file cannot be removed.
         """
-        if self._descriptor is None:
-            return
         descriptor, self._descriptor = self._descriptor, None
-        with contextlib.suppress(OSError):
-            os.close(descriptor)
+        if descriptor is not None:
+            with contextlib.suppress(OSError):
+                os.close(descriptor)
         try:
             self.path.unlink(missing_ok=True)
         except OSError as err:

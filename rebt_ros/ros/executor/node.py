@@ -53,6 +53,7 @@ _LOOK_PERIOD: Final = 0.5
 #: How long another thread may keep a tick waiting (seconds); Python's default is 5 ms.
 _HAND_OVER: Final = 0.0005
 
+_STOP_OTHERS: Final = "stop all but one"
 _REFUSED: Final = "refused trees"
 _NOVEL: Final = "states outside what was shown"
 
@@ -96,6 +97,7 @@ class ExecutorNode(Node):
         self._commands = 0
         self._slowest = 0.0
         self._watch = GraphWatch(self)
+        self._trees = f"{settings.learner}/behavior_tree" if settings.learner else "behavior_tree"
         self._last_snapshot = ""
         self._watchers = 0
         self._snapshot = self.create_publisher(String, "~/snapshot", 10)
@@ -116,7 +118,9 @@ class ExecutorNode(Node):
             )
         ready = self.create_guard_condition(self._take_prepared)
         self._background = Background(self._preparation.read, ready.trigger)
-        self.create_subscription(String, "behavior_tree", self._on_document, _TREE_QOS)
+        self._documents = self.create_subscription(
+            String, self._trees, self._on_document, _TREE_QOS
+        )
         for topic in self._settings.takeover.topics:
             self.create_subscription(String, topic, partial(self._on_person, topic), 10)
         if self._settings.tree_file is not None:
@@ -130,6 +134,10 @@ class ExecutorNode(Node):
         self.create_timer(_LOOK_PERIOD, self._look_at_publishers, clock=steady)
         self._diagnostics = Diagnostics(self, "execution", self._report)
         self._say_who_drives()
+        if self._settings.learner:
+            self.get_logger().info(
+                f"following the trees of {self._settings.learner}, on {self._documents.topic_name}."
+            )
         self.get_logger().info(
             f"enabled: {self._condition()}."
             if self._enabled
@@ -269,8 +277,7 @@ class ExecutorNode(Node):
 
     def _look_at_publishers(self) -> None:
         for robot in self._robots.values():
-            for problem in robot.look():
-                self._watch.note(problem, waits=problem.startswith("nobody"))
+            robot.look()
 
     def _on_state(self, topic: str, message: Float64MultiArray) -> None:
         # A message may still come on a topic that no tree reads any longer.
@@ -473,6 +480,7 @@ class ExecutorNode(Node):
             "ticks": self._ticks,
             "commands": self._commands,
             "longest tick (ms)": f"{self._slowest * 1e3:.1f}",
+            "trees from": self._documents.topic_name,
             "takeovers": self._takeover.count,
             _REFUSED: 0,
             _NOVEL: 0,
@@ -497,24 +505,37 @@ class ExecutorNode(Node):
         if self._faults.recent:
             return Report(Level.WARN, f"{condition}; {self._faults.recent}", values)
         blocked = self._enabled and condition != "running"
-        problems = self._problems() if self._enabled else []
+        problems = self._problems()
         if problems:
             return Report(Level.WARN, "; ".join((condition, *problems)), values)
         return Report(Level.WARN if blocked else Level.OK, condition, values)
 
     def _problems(self) -> list[str]:
-        """What in the graph keeps the tree from driving, or makes it a matter of chance."""
-        commands = self._channels.topics
-        return [
-            *self._watch.timeless(),
-            *self._watch.several(
-                ["behavior_tree"], "trees", "chance decides which one drives; stop all but one"
+        """What in the graph keeps the tree from driving, or makes it a matter of chance.
+
+        What a disabled executor lacks it may still get before it is enabled.
+        """
+        watch, commands = self._watch, self._channels.topics
+        findings = [
+            *watch.several(
+                self._trees,
+                "trees",
+                "chance decides which one drives; name one with the parameter 'learner', or stop "
+                "all but one",
             ),
-            *self._watch.several(commands, "commands", "stop all but one"),
-            *self._watch.unheard(self._subscriptions_by_topic.values()),
-            *(problem for robot in self._robots.values() for problem in robot.look()),
-            *self._watch.unread(commands),
+            *watch.misfits([self._documents]),
+            *(finding for robot in self._robots.values() for finding in robot.look()),
+            *(one for topic in commands for one in watch.several(topic, "commands", _STOP_OTHERS)),
         ]
+        if self._settings.learner:
+            findings += watch.unheard([self._documents])
+        if self._enabled:
+            findings += [
+                *watch.timeless(),
+                *watch.unheard(self._subscriptions_by_topic.values()),
+                *watch.unread(commands),
+            ]
+        return watch.say(findings)
 
 
 def main(args: list[str] | None = None) -> None:

@@ -12,6 +12,7 @@ from rebt_ros.live.tree_inputs import Message, TreeInputs
 from rebt_ros.robot_file.binding import BoundTopic
 from rebt_ros.robot_file.features import Categories, FeatureReader
 from rebt_ros.robot_file.robot_file import RobotFile
+from rebt_ros.ros.graph_watch import Finding
 from rebt_ros.ros.robot_files import RobotTopics
 
 #: The newest state only.
@@ -66,7 +67,7 @@ class RobotInputs:
         """The topics on which no message came yet."""
         return [topic for topic in self._inputs.topics if topic not in self._inputs.values]
 
-    def look(self) -> list[str]:
+    def look(self) -> list[Finding]:
         """See `RobotTopics.look`."""
         return self._topics.look()
 

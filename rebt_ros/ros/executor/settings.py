@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.validate_topic_name import validate_topic_name
 
+from rebt_ros.errors import OptionError
 from rebt_ros.live.novelty_guard import Novelty
 from rebt_ros.ros.parameters import Parameters, at_home, nanoseconds
 
@@ -36,6 +39,8 @@ class ExecutorSettings:
     tree_file: Path | None
     rules_file: Path | None
     """Rules that every tree must keep."""
+    learner: str
+    """Node whose trees are followed; empty for any."""
     rate: float
     """Ticks per second."""
     tick_on_state: bool
@@ -68,6 +73,12 @@ def declare_settings(node: Node) -> ExecutorSettings:
         "File of rules (docs/rules.md): trees that are not proven to keep them are refused; empty "
         "for none.",
     )()
+    learner = declare.text(
+        "learner",
+        "",
+        "Node whose trees are followed, such as /robot/learner, where there are several; empty to "
+        "follow whoever publishes on behavior_tree.",
+    )().rstrip("/")
     rate = declare.number(
         "rate",
         20.0,
@@ -91,9 +102,12 @@ def declare_settings(node: Node) -> ExecutorSettings:
         "none does.",
         choices=("timer", "state"),
     )()
-    return ExecutorSettings(
+    if learner:
+        _check_node(learner)
+    settings = ExecutorSettings(
         tree_file=at_home("tree_file", tree_file) if tree_file else None,
         rules_file=at_home("rules_file", rules_file) if rules_file else None,
+        learner=learner,
         rate=rate,
         tick_on_state=tick_on == "state",
         state_timeout=nanoseconds(state_timeout),
@@ -118,6 +132,18 @@ def declare_settings(node: Node) -> ExecutorSettings:
         takeover=_takeover(declare),
         novelty=_novelty(declare),
     )
+    declare.refuse_others()
+    return settings
+
+
+def _check_node(name: str) -> None:
+    try:
+        validate_topic_name(name)
+    except InvalidTopicNameException as err:
+        raise OptionError(
+            f"parameter 'learner' is {name!r}, which is no name of a node: name it as "
+            "'ros2 node list' does, such as /robot/learner."
+        ) from err
 
 
 def _takeover(declare: Parameters) -> TakeoverSettings:

@@ -6,6 +6,7 @@ import threading
 import time
 import traceback
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
@@ -72,7 +73,11 @@ class LearnerNode(Node):
         self._figures: Mapping[str, str] = {}
         self._watch = GraphWatch(self)
         self._settings = declare_settings(self)
-        self._publisher = self.create_publisher(String, "behavior_tree", TREE_QOS)
+        # On the second one an executor follows this learner, whoever else publishes trees.
+        self._tree_publishers = [
+            self.create_publisher(String, topic, TREE_QOS)
+            for topic in ("behavior_tree", "~/behavior_tree")
+        ]
         self._publish_what_is_on_disk()
         self._process = LearningProcess()
         try:
@@ -164,11 +169,24 @@ class LearnerNode(Node):
             call.progress = _PUBLISHING
         write_text_atomically(path, lesson.document)
         self._versions().keep(lesson.document)
-        for name, text in lesson.files.items():
-            write_text_atomically(path.with_name(name), text)
         self._figures = lesson.figures
         self._publish(learned, lesson.document)
+        # Nobody has to wait for pictures.
+        threading.Thread(target=self._write_files, args=[path.parent], daemon=True).start()
         return f"{lesson.sentence} It is published and in {path}.{_in_short(lesson.notes)}"
+
+    def _write_files(self, directory: Path) -> None:
+        """Writes what the command `learn` writes."""
+        try:
+            notes = self._process.write(directory)
+        except LearningError as err:
+            # Its end is none of a node's faults.
+            if self.context.ok():
+                self.get_logger().warning(f"not all files of the tree were written: {err}")
+            return
+        for note in notes:
+            self.get_logger().warning(f"{note}.")
+        self.get_logger().info(f"summary and pictures of the tree are in {directory.absolute()}.")
 
     def _hold_back(self, lesson: Lesson) -> None:
         """Refuses a tree that is not to be published.
@@ -276,7 +294,8 @@ class LearnerNode(Node):
 
     def _publish(self, learned: LearnedTree, document: str) -> None:
         self._learned = learned
-        self._publisher.publish(String(data=document))
+        for publisher in self._tree_publishers:
+            publisher.publish(String(data=document))
 
     def _report(self) -> Report:
         values: dict[str, Any] = {"learning process": self._process.id or "none"}
@@ -298,9 +317,12 @@ class LearnerNode(Node):
             values |= {"stage": progress.stage, "progress (%)": round(100 * progress.share)}
             return Report(Level.OK, str(call), values)
         values["stage"] = "idle"
-        problems = self._watch.several(
-            ["behavior_tree"], "trees", "executors follow one by chance; stop all but one"
+        several = self._watch.several(
+            "behavior_tree",
+            "trees",
+            "executors without a parameter 'learner' follow one by chance; stop all but one",
         )
+        problems = self._watch.say(several)
         if problems:
             return Report(Level.WARN, "; ".join((self._last.message, *problems)), values)
         return Report(self._last.level, self._last.message, values)

@@ -80,7 +80,7 @@ def declare_settings(node: Node) -> LearnerSettings:
         OptionError: One makes no sense.
     """
     declare = Parameters(node)
-    return LearnerSettings(
+    settings = LearnerSettings(
         demonstrations=declare.directory(
             "demonstrations",
             "demonstrations",
@@ -132,6 +132,8 @@ def declare_settings(node: Node) -> LearnerSettings:
         ),
         options={**_pruning(declare), **_form(declare), **_rows(declare)},
     )
+    declare.refuse_others()
+    return settings
 
 
 def _rules(declare: Parameters) -> RuleSettings:

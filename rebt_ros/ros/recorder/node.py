@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, Final
 
 from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock, ROSClock
+from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -32,6 +32,7 @@ from rebt_ros.ros import lifetime
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.graph_watch import GraphWatch
+from rebt_ros.ros.node_clock import simulated_time
 from rebt_ros.ros.recorder.sending_time import SendingTime, received_at
 from rebt_ros.ros.recorder.settings import declare_settings
 from rebt_ros.ros.robot_files import RobotTopics
@@ -46,6 +47,9 @@ _LATE: Final = 1.0
 
 #: Least time between two fetches (seconds).
 _LEAST_PERIOD: Final = 0.005
+
+#: Kind of the fault that an action came before there was a time for its row.
+_TIMELESS: Final = "action before the first /clock"
 
 #: Time between two looks at who publishes (seconds).
 _LOOK_PERIOD: Final = 0.5
@@ -110,12 +114,11 @@ class RecorderNode(Node):
         self._heard: dict[str, float] = {}
         self._reported = time.monotonic()
         self._immediate = settings.reorder_window == 0
-        self._sources: list[Subscription] = []
         self._robot: RobotTopics | None = None
         self._readers: dict[str, FeatureReader] = {}
         self._categories: dict[str, Categories] = {}
-        self._listen_to_demonstrator()
-        self._listen_to_executor()
+        self._shown = self._listen_to_demonstrator()
+        self._sources = [*self._shown, *self._listen_to_executor()]
         topics = [source.topic_name for source in self._sources]
         if settings.robot is not None:
             topics += map(self.resolve_topic_name, settings.sources)
@@ -192,7 +195,7 @@ class RecorderNode(Node):
         self.get_logger().info(f"recording to {writer.path}.")
         return writer
 
-    def _listen_to_demonstrator(self) -> None:
+    def _listen_to_demonstrator(self) -> list[Subscription]:
         waking = None if self._immediate else _Fetched()
         if self._settings.robot is not None:
             self._robot = RobotTopics(
@@ -203,22 +206,32 @@ class RecorderNode(Node):
                 self._robot_callback,
                 waking,
             )
-            return
+            return []
         states, actions = QoSProfile(depth=_QUEUE), QoSProfile(depth=_QUEUE)
         if self._settings.best_effort:
             states.reliability = ReliabilityPolicy.BEST_EFFORT
-        for topic in self._settings.state_topics:
-            take = partial(self._on_state, topic.name)
-            self._sources.append(
+        return [
+            *(
                 self.create_subscription(
-                    Float64MultiArray, topic.name, take, states, callback_group=waking
+                    Float64MultiArray,
+                    topic.name,
+                    partial(self._on_state, topic.name),
+                    states,
+                    callback_group=waking,
                 )
-            )
-        for channel in self._settings.action_topics:
-            take = partial(self._on_action, channel)
-            self._sources.append(
-                self.create_subscription(String, channel, take, actions, callback_group=waking)
-            )
+                for topic in self._settings.state_topics
+            ),
+            *(
+                self.create_subscription(
+                    String,
+                    channel,
+                    partial(self._on_action, channel),
+                    actions,
+                    callback_group=waking,
+                )
+                for channel in self._settings.action_topics
+            ),
+        ]
 
     def _robot_callback(self, bound: BoundTopic) -> Callable[..., None]:
         if bound.features and bound.name not in self._readers:
@@ -234,10 +247,11 @@ class RecorderNode(Node):
         """The subscriptions to states and actions."""
         if self._robot is not None:
             return list(self._robot.subscriptions.values())
-        return self._sources[: len(self._settings.sources)]
+        return self._shown
 
-    def _listen_to_executor(self) -> None:
+    def _listen_to_executor(self) -> list[Subscription]:
         """Subscribes to what tells demonstrations and corrections apart."""
+        sources = []
         commands, driving = self._settings.executor.commands, self._settings.executor.driving
         channels = self._settings.action_topics
         shown = {self.resolve_topic_name(channel) for channel in channels}
@@ -246,13 +260,14 @@ class RecorderNode(Node):
             # A robot that was told to learn from itself is not corrected by itself.
             if self.resolve_topic_name(topic) not in shown:
                 take = partial(self._on_command, channel)
-                self._sources.append(
+                sources.append(
                     self.create_subscription(String, topic, take, QoSProfile(depth=_QUEUE))
                 )
         if driving:
-            self._sources.append(
+            sources.append(
                 self.create_subscription(Bool, driving, partial(self._on_driving), DRIVING_QOS)
             )
+        return sources
 
     def _on_command(self, channel: str, message: String, info: dict[str, Any]) -> None:
         place = self._place(info)
@@ -324,7 +339,15 @@ class RecorderNode(Node):
                 "their clocks agree.",
             )
         place = received if sent is None else sent
-        take = partial(self._session.act, self._stamp(place), channel, label, sent)
+        stamp = self._stamp(place)
+        if stamp == 0:
+            self._faults.note(
+                _TIMELESS,
+                f"action {label!r} on {channel!r} is not recorded, because it came before the "
+                "first message on /clock: start the simulator, or unset use_sim_time.",
+            )
+            return
+        take = partial(self._session.act, stamp, channel, label, sent)
         self._queue(place, take, waits=sent is not None)
 
     def _note(self, topic: str, info: dict[str, Any]) -> None:
@@ -339,8 +362,7 @@ class RecorderNode(Node):
 
     def _look_at_publishers(self) -> None:
         if self._robot is not None:
-            for problem in self._robot.look():
-                self._watch.note(problem, waits=problem.startswith("nobody"))
+            self._robot.look()
         ready = not self._unheard()
         if ready is not self._said_ready:
             self._said_ready = ready
@@ -353,16 +375,25 @@ class RecorderNode(Node):
     def _unheard(self) -> list[str]:
         """Topics that would be missing in a demonstration that began now."""
         states = {topic.name for topic in self._settings.state_topics}
-        return [
+        sources = (
+            self._robot.subscriptions
+            if self._robot is not None
+            else dict(zip(self._settings.sources, self._shown, strict=True))
+        )
+        # A publisher that is there may have another type, or QoS that does not fit.
+        connected = {name for name, one in sources.items() if one.get_publisher_count()}
+        unheard = [
             name
             for name in self._settings.sources
-            if (name not in self._heard if name in states else not self.count_publishers(name))
+            if name not in (self._heard if name in states else connected)
         ]
+        return [*unheard, "/clock"] if simulated_time(self) == 0 else unheard
 
     def _problems(self) -> list[str]:
         """What in the graph keeps this node from recording."""
+        watch = self._watch
         unfit = self._robot.look() if self._robot is not None else []
-        return [*self._watch.timeless(), *unfit, *self._watch.unheard(self._demonstrators)]
+        return watch.say([*watch.timeless(), *unfit, *watch.unheard(self._demonstrators)])
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any
@@ -425,9 +456,8 @@ class RecorderNode(Node):
 
     def _stamp(self, place: int) -> int:
         """What a row says: its action's place, or simulated time where that is in use."""
-        clock = self.get_clock()
-        simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
-        return int(clock.now().nanoseconds) if simulated else place
+        simulated = simulated_time(self)
+        return place if simulated is None else simulated
 
     def _count_losses(self) -> None:
         for topic, count in self._losses.settle(self.count_publishers).items():
@@ -464,13 +494,13 @@ class RecorderNode(Node):
         silent = [topic for topic in self._received if now - self._heard.get(topic, 0.0) > _SILENT]
         if session.failure:
             return Report(Level.ERROR, session.failure, values)
-        if not session.recording:
-            return Report(Level.OK, "not recording", values)
-        if self._faults.recent:
-            return Report(Level.WARN, self._faults.recent, values)
         problems = self._problems()
-        if problems:
-            return Report(Level.WARN, "; ".join(problems), values)
+        if not session.recording:
+            level = Level.WARN if problems else Level.OK
+            return Report(level, "; ".join(("not recording", *problems)), values)
+        if self._faults.recent or problems:
+            recent = [self._faults.recent] if self._faults.recent else []
+            return Report(Level.WARN, "; ".join((*recent, *problems)), values)
         if silent:
             return Report(Level.WARN, f"no messages on {', '.join(silent)}", values)
         if session.awaited:

@@ -116,7 +116,7 @@ def declare_settings(node: Node) -> RecorderSettings:
     robot = robot_file(declare)
     if robot is not None:
         _check_beside(robot, names, fields, actions)
-    return RecorderSettings(
+    settings = RecorderSettings(
         state_topics=_state_topics(names, fields) if robot is None else state_topics_of(robot),
         action_topics=actions if robot is None else tuple(robot.actions),
         robot=robot,
@@ -140,6 +140,8 @@ def declare_settings(node: Node) -> RecorderSettings:
             3600.0,
         )(),
     )
+    declare.refuse_others()
+    return settings
 
 
 def _check_beside(

@@ -15,6 +15,8 @@ from std_srvs.srv import Trigger
 
 from rebt_ros.errors import OptionError
 from rebt_ros.ros import lifetime
+from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
+from rebt_ros.ros.graph_watch import GraphWatch
 from rebt_ros.ros.parameters import Parameters
 from rebt_ros.simulated_robot.episode import Episode
 from rebt_ros.simulated_robot.robot import Robot, State
@@ -27,7 +29,7 @@ _REMEMBERED: Final = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class _Settings:
+class RobotSettings:
     """What the robot was started with; times are simulated seconds."""
 
     command_topics: tuple[str, ...]
@@ -43,7 +45,7 @@ class _Settings:
     """Reads what it is set to by now."""
 
 
-def _declare_settings(node: Node) -> _Settings:
+def declare_settings(node: Node) -> RobotSettings:
     """Declares and reads the parameters.
 
     Raises:
@@ -55,7 +57,7 @@ def _declare_settings(node: Node) -> _Settings:
     )()
     if not command_topics:
         raise OptionError("parameter 'command_topics' is empty: name at least one topic.")
-    return _Settings(
+    settings = RobotSettings(
         command_topics=command_topics,
         rate=declare.number("rate", 20.0, "Time steps per simulated second (Hz).", 5.0, 200.0)(),
         speedup=declare.number(
@@ -87,6 +89,8 @@ def _declare_settings(node: Node) -> _Settings:
             fixed=False,
         ),
     )
+    declare.refuse_others()
+    return settings
 
 
 def _layout() -> MultiArrayLayout:
@@ -108,7 +112,7 @@ class RobotNode(Node):
 
     def __init__(self) -> None:
         super().__init__("robot")
-        self._settings = settings = _declare_settings(self)
+        self._settings = settings = declare_settings(self)
         self._time_step = 1.0 / settings.rate
         # While time stands still, the state is repeated at the rate of real time.
         self._repeat_every = max(round(settings.speedup), 1)
@@ -134,12 +138,16 @@ class RobotNode(Node):
             "~/episode",
             QoSProfile(depth=_REMEMBERED, durability=DurabilityPolicy.TRANSIENT_LOCAL),
         )
-        for topic in dict.fromkeys(settings.command_topics):
-            # A queue would only make commands late.
+        # A queue would only make commands late.
+        self._commands = [
             self.create_subscription(String, topic, self._on_command, 1)
+            for topic in dict.fromkeys(settings.command_topics)
+        ]
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.add_post_set_parameters_callback(self._on_parameters)
         self.create_timer(1.0 / (settings.rate * settings.speedup), self._on_tick)
+        self._watch = GraphWatch(self)
+        self._diagnostics = Diagnostics(self, "simulation", self._report)
 
     def _on_command(self, message: String) -> None:
         self._command = message.data
@@ -184,6 +192,17 @@ class RobotNode(Node):
         self._answered = False
         self._command = None
         self._silence = 0
+
+    def _report(self) -> Report:
+        watch = self._watch
+        # One who commands is enough.
+        findings = [*watch.timeless(), *watch.misfits(self._commands)]
+        if not any(watch.publishing(one.topic_name) for one in self._commands):
+            findings += watch.unheard(self._commands)
+        problems = watch.say(findings)
+        message = "under way" if self._under_way else "waiting for a command"
+        values = {"run": self._runs + 1, "start": self._robot.start}
+        return Report(Level.WARN if problems else Level.OK, "; ".join((message, *problems)), values)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         start = self._settings.first_start() if self._new_first_start else self._robot.start + 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from rclpy.duration import Duration
@@ -13,6 +15,8 @@ from std_srvs.srv import SetBool
 from rebt_ros.demonstration.fields import dimension_labels_of
 from rebt_ros.errors import OptionError
 from rebt_ros.ros import lifetime
+from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
+from rebt_ros.ros.graph_watch import GraphWatch
 from rebt_ros.ros.parameters import Parameters, at_home
 from rebt_ros.storage.text import read_text
 from rebt_ros.study.simulator.configuration import parse_config
@@ -32,6 +36,63 @@ _QUEUE: Final = 1000
 _GREETING: Final = 1.0
 
 
+@dataclass(frozen=True, slots=True)
+class SyntheticRobotSettings:
+    """What the robot was started with."""
+
+    config: Path
+    seed: int
+    rate: float
+    """Ticks of the tree per second."""
+    ticks: int
+    """Until the robot stops for good; 0 for no end."""
+    running_chance: float
+    repeats: int
+    enabled: bool
+    audience: int
+    """Subscribers that state and action must have each before the robot begins to act."""
+
+
+def declare_settings(node: Node) -> SyntheticRobotSettings:
+    """Declares and reads the parameters.
+
+    Raises:
+        OptionError: One makes no sense.
+    """
+    declare = Parameters(node)
+    path = declare.text("config", "", "Configuration file of an experiment; ~ is your home.")()
+    settings = SyntheticRobotSettings(
+        config=at_home("config", path),
+        seed=declare.integer("seed", 0, "Equal numbers give equal robots.", -_LARGEST, _LARGEST)(),
+        rate=declare.number("rate", 10.0, "Ticks of the tree per second.", 0.1, 1000.0)(),
+        ticks=declare.integer(
+            "ticks", 0, "Ticks until the robot stops for good; 0 for no end.", 0, _LARGEST
+        )(),
+        running_chance=declare.number(
+            "running_chance",
+            RUNNING_CHANCE,
+            "How often an action that is tried is not done yet; below 1.",
+            0.0,
+            1.0,
+        )(),
+        repeats=declare.integer(
+            "repeats", REPEATS, "How often Repeaters run their children.", 1, _LARGEST
+        )(),
+        enabled=declare.flag("enabled", True, "Whether to act from the start.")(),
+        audience=declare.integer(
+            "wait_for_subscribers",
+            0,
+            "Subscribers that state and action must have each before the robot begins to act.",
+            0,
+            1000,
+        )(),
+    )
+    declare.refuse_others()
+    if not path:
+        raise OptionError("parameter 'config' is empty: give it a configuration file.")
+    return settings
+
+
 class SyntheticRobotNode(Node):
     """Senses and acts by chance, and publishes both, as a robot and its demonstrator would.
 
@@ -44,43 +105,17 @@ class SyntheticRobotNode(Node):
 
     def __init__(self) -> None:
         super().__init__("synthetic_robot")
-        declare = Parameters(self)
-        path = declare.text("config", "", "Configuration file of an experiment; ~ is your home.")()
-        seed = declare.integer("seed", 0, "Equal numbers give equal robots.", -_LARGEST, _LARGEST)()
-        rate = declare.number("rate", 10.0, "Ticks of the tree per second.", 0.1, 1000.0)()
-        self._ticks = declare.integer(
-            "ticks", 0, "Ticks until the robot stops for good; 0 for no end.", 0, _LARGEST
-        )()
-        running_chance = declare.number(
-            "running_chance",
-            RUNNING_CHANCE,
-            "How often an action that is tried is not done yet; below 1.",
-            0.0,
-            1.0,
-        )()
-        repeats = declare.integer(
-            "repeats", REPEATS, "How often Repeaters run their children.", 1, _LARGEST
-        )()
-        self._enabled = declare.flag("enabled", True, "Whether to act from the start.")()
-        self._audience = declare.integer(
-            "wait_for_subscribers",
-            0,
-            "Subscribers that state and action must have each before the robot begins to act.",
-            0,
-            1000,
-        )()
-        if not path:
-            raise OptionError("parameter 'config' is empty: give it a configuration file.")
-
-        file = at_home("config", path)
-        config = parse_config(read_text(file), file.stem)
+        settings = declare_settings(self)
+        self._ticks, self._audience = settings.ticks, settings.audience
+        self._enabled = settings.enabled
+        config = parse_config(read_text(settings.config), settings.config.stem)
         for note in config.notes:
             self.get_logger().warning(f"{note}.")
         self._robot = ExperimentRobot(
             config,
-            seed,
-            running_chance=running_chance,
-            repeats=repeats,
+            settings.seed,
+            running_chance=settings.running_chance,
+            repeats=settings.repeats,
             variables=published_variables(config),
         )
         self._ticked = 0
@@ -98,7 +133,9 @@ class SyntheticRobotNode(Node):
         self._actions = self.create_publisher(String, "action", qos)
         self._outcomes = self.create_publisher(Bool, "outcome", qos)
         self.create_service(SetBool, "~/enable", self._on_enable)
-        self.create_timer(1.0 / rate, self._on_tick)
+        self.create_timer(1.0 / settings.rate, self._on_tick)
+        self._watch = GraphWatch(self)
+        self._diagnostics = Diagnostics(self, "acting", self._report)
         self.get_logger().info(f"{config.name}: {self._what_it_does()}")
 
     def _on_tick(self) -> None:
@@ -154,6 +191,14 @@ class SyntheticRobotNode(Node):
 
     def _publish_state(self) -> None:
         self._states.publish(Float64MultiArray(layout=self._layout, data=self._robot.state))
+
+    def _report(self) -> Report:
+        watch, topics = self._watch, (self._states, self._actions)
+        findings = [*watch.timeless(), *watch.unread(one.topic_name for one in topics)]
+        problems = watch.say(findings if self._enabled and not self._over else ())
+        values = {"enabled": self._enabled, "ticks": self._ticked, "actions": self._done}
+        message = self._what_it_does().rstrip(".")
+        return Report(Level.WARN if problems else Level.OK, "; ".join((message, *problems)), values)
 
     def _what_it_does(self) -> str:
         if self._over:

@@ -13,6 +13,7 @@ from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
+from rebt_ros.ros.log_files import arguments_for_logging
 from rebt_ros.ros.trial.executor import ExecutorHandle
 from rebt_ros.ros.trial.peer import PATIENCE, TrialPeer
 from rebt_ros.ros.trial.world import SilentJudge, TopicJudge, World
@@ -177,7 +178,10 @@ def driving(
     signals: list[int] = []
     with _handled(lambda number, _: signals.append(number)):
         try:
-            rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
+            rclpy.init(
+                args=arguments_for_logging(arguments),
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
         except Exception as err:
             reason = str(err).split(", at /")[0]
             raise TrialError(f"the ROS arguments are not understood: {reason}.") from err
