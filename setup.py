@@ -102,6 +102,8 @@ setup(
         "cluster": ["distributed>=2023.5", "joblib>=1.4"],
         # Box2D has wheels for one kind of processor; without it one task of many is left out.
         "driving": [f"gymnasium{'[box2d]' * (machine() == 'x86_64')}>=1", "minigrid>=3"],
+        # BehaviorTree.CPP in Python, to test exported trees: wheels for one kind of processor.
+        "engines": ["behaviortreepy>=0.1.4"] if machine() == "x86_64" else [],
         "pictures": ["matplotlib>=3.6"],
         "test": ["hypothesis", "jsonschema>=4.10", "pytest", "pytest-xdist>=3"],
         "upsampling": ["imbalanced-learn>=0.12"],
@@ -113,6 +115,7 @@ setup(
             f"demo = {PACKAGE}.commands.demo:main",
             f"describe = {PACKAGE}.commands.describe:main",
             f"experiment = {PACKAGE}.commands.experiment:main",
+            f"export = {PACKAGE}.commands.export:main",
             f"explain = {PACKAGE}.commands.explain:main",
             f"generate = {PACKAGE}.commands.generate:main",
             f"learn = {PACKAGE}.commands.learn:main",

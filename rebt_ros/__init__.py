@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from rebt_ros.demonstration.last_action import History
     from rebt_ros.demonstration.schema import Feature, FeatureKind
     from rebt_ros.errors import DocumentError, InputError, OptionError, RebtError
+    from rebt_ros.export.btcpp import to_btcpp
     from rebt_ros.learning.learning import Learning
     from rebt_ros.learning.learning_file import load_learning
     from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
@@ -116,6 +117,7 @@ __all__ = [
     "learn",
     "load_learning",
     "replay",
+    "to_btcpp",
 ]
 
 _HOMES = {
@@ -173,6 +175,7 @@ _HOMES = {
     "learn": "rebt_ros.offline.learning_from_files",
     "load_learning": "rebt_ros.learning.learning_file",
     "replay": "rebt_ros.offline.replay_over_files",
+    "to_btcpp": "rebt_ros.export.btcpp",
 }
 
 

@@ -30,7 +30,7 @@ LAYERS: Final = (
     {PACKAGE},  # rebt_ros/__init__.py, the public interface
     {"offline", "study"},
     {"learning", "trial"},
-    {"storage", "simulated_robot", "drawing", "beyond_the_paper", "verification"},
+    {"storage", "simulated_robot", "drawing", "beyond_the_paper", "export", "verification"},
     {"paper"},
     {"decision_tree"},
     {"behavior_tree"},
@@ -298,6 +298,7 @@ def test_the_core_runs_where_ros_is_not_installed() -> None:
             "describe",
             "experiment",
             "explain",
+            "export",
             "generate",
             "learn",
             "replay",

@@ -17,6 +17,7 @@ COMMANDS = (
     "demo",
     "describe",
     "experiment",
+    "export",
     "generate",
     "learn",
     "replay",

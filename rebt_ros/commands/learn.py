@@ -30,6 +30,7 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import OptionError
+from rebt_ros.export.languages import LANGUAGES
 from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.judged_levels import JudgedLevels
 from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
@@ -37,6 +38,7 @@ from rebt_ros.learning.pipeline import summary_sentence
 from rebt_ros.learning.report import FORECAST, LearningReport
 from rebt_ros.offline import learning_from_files
 from rebt_ros.offline.result import OfflineLearning
+from rebt_ros.storage.atomic import write_text_atomically
 
 _REDUCTIONS = {
     "domain": "do not use that thresholds, categories and last actions exclude each other",
@@ -92,6 +94,12 @@ def _parser() -> argparse.ArgumentParser:
 def _add_output(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=directory, default=Path("learned"), metavar="DIR", help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--export",
+        choices=list(LANGUAGES),
+        help="also write the tree in the language of another engine; btcpp: XML of "
+        "BehaviorTree.CPP 4, to DIR/btcpp.xml",
     )
     parser.add_argument(
         "--levels",
@@ -405,6 +413,16 @@ def _learn(parsed: argparse.Namespace) -> None:
         print("\n".join(_suggestions(result.learned)))
     files = "tree.json, summary.json and pictures of the tree and of its decision tree"
     print(f"Written to {parsed.out}: {files}{', levels/' if parsed.levels else ''}.")
+    if parsed.export is not None:
+        _export(result.learned, parsed.export, parsed.out)
+
+
+def _export(learned: LearnedTree, language: str, directory: Path) -> None:
+    """Writes the tree for another engine, or else leaves none there that is of another tree."""
+    path = directory / f"{language}.xml"
+    path.unlink(missing_ok=True)
+    write_text_atomically(path, LANGUAGES[language](learned))
+    print(f"Exported to {path}.")
 
 
 def _declared(parsed: argparse.Namespace) -> dict[str, FeatureKind]:

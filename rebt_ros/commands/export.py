@@ -1,0 +1,41 @@
+"""Writes a learned tree in the language of another engine: BehaviorTree.CPP 4, for Groot2 too."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rebt_ros.commands.shell import parse, run
+from rebt_ros.export.languages import LANGUAGES
+from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.tree_file import read_tree
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="export", description=__doc__)
+    parser.add_argument("tree", type=Path, metavar="TREE", help="tree.json of a learned tree")
+    parser.add_argument(
+        "--to",
+        choices=list(LANGUAGES),
+        default="btcpp",
+        help="btcpp: XML of BehaviorTree.CPP 4 (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE", help="write it to this file instead of printing it"
+    )
+    parsed = parse(parser, arguments)
+    run(lambda: _export(parsed.tree, parsed.to, parsed.out), "export")
+
+
+def _export(path: Path, language: str, out: Path | None) -> None:
+    text = LANGUAGES[language](read_tree(path))
+    if out is None:
+        print(text, end="")
+        return
+    write_text_atomically(out, text)
+    print(f"Written to {out}.")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""A learned tree in the languages of other behavior tree engines."""
