@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from random import Random
 
 import pytest
@@ -16,6 +17,17 @@ from py_trees.common import Status
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.demonstration import RowKind
+from rebt_ros.demonstration.schema import Feature
+from rebt_ros.errors import DocumentError
+from rebt_ros.export.btcpp import to_btcpp
+from rebt_ros.logic.conditions import (
+    HasCategory,
+    Interval,
+    LastActionIs,
+    Literal,
+    PreviousActionIs,
+    Threshold,
+)
 
 pytest.importorskip("behaviortreepy", reason="needs behaviortreepy, the engine in Python")
 
@@ -62,28 +74,39 @@ ACTING = ONE_CHANNEL.filter(lambda tree: bool(nodes.actions(tree)))
 CHANNELS = st.tuples(ACTING, ACTING).map(
     lambda trees: nodes.Parallel((_on("arm", trees[0]), _on("base", trees[1])))
 )
-NUMBERS = (-1e30, -0.5, -0.1, 0.0, 0.1, math.nextafter(0.1, 1), 0.2, 0.3, 0.5, 1e30, math.nan)
-#: Values of `some.FEATURES`.
-VALUES = (NUMBERS, NUMBERS, (0.0, 1.0, math.nan), (0.0, 1.0, 2.0, math.nan))
 
 
-def _steps(seed: int) -> Iterator[tuple[tuple[float, ...], Outcomes]]:
+def _values(feature: Feature, tree: nodes.Node) -> list[float]:
+    """Values on all sides of what a tree tests, and a missing one."""
+    if feature.categories:
+        return [*map(float, range(len(feature.categories))), math.nan]
+    found = [0.0, 1.0, -1e30, 1e30, math.nan]
+    for node in nodes.conditions(tree):
+        match node.literal.condition:
+            case Threshold(value=end) | Interval(at_most=end):
+                found += [math.nextafter(end, -math.inf), end, math.nextafter(end, math.inf)]
+    return [value for value in found if not math.isinf(value)]
+
+
+def _steps(learned: LearnedTree, seed: int) -> Iterator[tuple[tuple[float, ...], Outcomes]]:
     """States, some of which stay for a while, and how each action ends in each tick."""
     random = Random(seed)
-    state = tuple(map(random.choice, VALUES))
+    values = [_values(feature, learned.tree) for feature in learned.features]
+    state = tuple(map(random.choice, values))
     for _ in range(TICKS):
         if random.random() < 0.6:
-            state = tuple(map(random.choice, VALUES))
-        yield state, {label: random.choice(ENDINGS) for label in some.LABELS}
+            state = tuple(map(random.choice, values))
+        yield state, {action.label: random.choice(ENDINGS) for action in learned.actions}
 
 
 def _differences(
     learned: LearnedTree,
     seed: int,
     interrupted_after: int | None = None,
+    text: str | None = None,
 ) -> Iterator[str]:
-    ours, engine = Ours(learned), Engine(learned)
-    for number, (state, outcomes) in enumerate(_steps(seed)):
+    ours, engine = Ours(learned), Engine(learned, text)
+    for number, (state, outcomes) in enumerate(_steps(learned, seed)):
         (wanted, status), (done, its) = ours.tick(state, outcomes), engine.tick(state, outcomes)
         if wanted != done:
             yield f"tick {number}: {wanted} here, {done} there"
@@ -108,3 +131,66 @@ def test_both_engines_tick_the_same_actions(
 ) -> None:
     learned = some.learned(tree, row_kind=row_kind)
     assert list(_differences(learned, seed, interrupted_after)) == []
+
+
+@settings(max_examples=200)
+@given(some.learned_trees(), st.integers(0, 10**6))
+def test_both_engines_agree_whatever_things_are_called(learned: LearnedTree, seed: int) -> None:
+    learned = replace(learned, tree=_exportable(learned.tree), suggestions=())
+    try:
+        to_btcpp(learned)
+    except DocumentError:
+        return
+    assert list(_differences(learned, seed)) == []
+
+
+GO, TURN, WAIT = map(some.action, ("go", "turn", "wait"))
+NEAR, KNOWN_CUP = Literal(Threshold("distance", 0.3)), Literal(HasCategory("kind", "cup"))
+AFTER_GO, LAST_GO = Literal(PreviousActionIs("go")), Literal(LastActionIs("go", ("turn",)))
+
+
+@pytest.mark.parametrize(
+    ("tree", "right", "wrong"),
+    [
+        pytest.param(
+            nodes.Selector((some.when(NEAR, then=GO), TURN)),
+            "ReactiveFallback",
+            "Fallback",
+            id="memory of a Selector",
+        ),
+        pytest.param(
+            some.when(NEAR, then=GO), "ReactiveSequence", "Sequence", id="memory of a Sequence"
+        ),
+        pytest.param(
+            some.when(NEAR, then=GO), " &amp;&amp; !(distance &gt; 0.3)", "", id="missing numbers"
+        ),
+        pytest.param(
+            nodes.Selector((some.when(KNOWN_CUP, then=GO), TURN)), "==", "!=", id="categories"
+        ),
+        pytest.param(
+            nodes.Selector((nodes.Repeater((GO, WAIT)), TURN)),
+            "KeepRunningUntilFailure",
+            "ForceSuccess",
+            id="Repeater",
+        ),
+        pytest.param(
+            nodes.Selector((some.when(AFTER_GO, then=TURN), GO)),
+            "previous_action := ended",
+            "previous_action := running",
+            id="previous action",
+        ),
+        pytest.param(
+            nodes.Selector((some.when(LAST_GO, then=TURN), some.when(NEAR, then=GO), WAIT)),
+            "last_action_before_turn := next_last_action_before_turn",
+            "next_last_action_before_turn := ''",
+            id="last action",
+        ),
+    ],
+)
+def test_a_wrong_mapping_is_noticed(tree: nodes.Node, right: str, wrong: str) -> None:
+    learned = some.learned(tree)
+    text = to_btcpp(learned)
+    assert right in text
+    assert not any(list(_differences(learned, seed)) for seed in range(10))
+    broken = text.replace(right, wrong)
+    assert any(list(_differences(learned, seed, text=broken)) for seed in range(10))
