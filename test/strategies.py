@@ -462,3 +462,25 @@ def _shown_leaves(declared: Sequence[Feature]) -> st.SearchStrategy[ShownLeaf]:
         for one in declared
     ]
     return st.builds(ShownLeaf, st.integers(0, 10**6), st.tuples(*values))
+
+
+#: What holds in every state.
+TRUE = Dnf((Conjunction(),))
+
+
+def implies(stronger: Literal, weaker: Literal) -> bool:
+    """Whether every state that satisfies `stronger` satisfies `weaker`.
+
+    >>> near, reachable = Literal(Threshold("x", 0.3)), Literal(Threshold("x", 0.5))
+    >>> implies(near, reachable), implies(reachable, near), implies(~reachable, ~near)
+    (True, False, True)
+    """
+    a, b = stronger.condition, weaker.condition
+    if (
+        isinstance(a, Threshold)
+        and isinstance(b, Threshold)
+        and a.quantity == b.quantity
+        and stronger.positive == weaker.positive
+    ):
+        return a.value <= b.value if stronger.positive else a.value >= b.value
+    return stronger == weaker

@@ -10,11 +10,12 @@ import strategies as some
 from algorithm_1 import algorithm_1
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from pruned_trees import train
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
-from rebt_ros.decision_tree.training import fit, train
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable

@@ -23,7 +23,7 @@ from rebt_ros.logic.conditions import (
     deciding,
     features_of,
 )
-from rebt_ros.logic.dnf import FALSE, TRUE, Conjunction, Dnf, conditions_of
+from rebt_ros.logic.dnf import FALSE, Conjunction, conditions_of
 
 NEAR = some.at_most("distance", 0.3)
 DOCKED = Literal(IsTrue("docked"))
@@ -144,22 +144,7 @@ def test_lat_conditions_of_different_rules_are_different_conditions() -> None:
     assert len(both) == 2
 
 
-@pytest.mark.parametrize(
-    ("rule", "is_true"),
-    [
-        (TRUE, True),
-        (FALSE, False),
-        (some.dnf([NEAR]), False),
-        (some.dnf([NEAR], []), True),
-        # True for a thinker, not for the property: it only looks for an empty conjunction.
-        (some.dnf([NEAR], [~NEAR]), False),
-    ],
-)
-def test_is_true_finds_a_conjunction_without_literals(rule: Dnf, is_true: bool) -> None:
-    assert rule.is_true is is_true
-
-
 def test_conditions_are_listed_once_in_the_order_in_which_they_occur() -> None:
     rule = some.dnf([CUP, ~NEAR], [NEAR, DOCKED], [~CUP])
     assert conditions_of(rule) == (CUP.condition, NEAR.condition, DOCKED.condition)
-    assert conditions_of(TRUE) == conditions_of(FALSE) == ()
+    assert conditions_of(some.TRUE) == conditions_of(FALSE) == ()

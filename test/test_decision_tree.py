@@ -11,6 +11,7 @@ import pytest
 import strategies as some
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from pruned_trees import train
 from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.behavior_tree.nodes import Action
@@ -25,7 +26,7 @@ from rebt_ros.decision_tree.encoding import (
 )
 from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.decision_tree.simplest import simplest
-from rebt_ros.decision_tree.training import fit, train
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import NO_ACTION, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import strategies as some
 from hypothesis import given, settings
+from pruned_trees import train
 
 from rebt_ros.decision_tree.differences import likely_differences
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
-from rebt_ros.decision_tree.training import train
 from rebt_ros.decision_tree.tree import Split
 from rebt_ros.demonstration.builder import LARGEST_VALUE
 from rebt_ros.demonstration.lags import with_lags

@@ -19,6 +19,7 @@ import strategies as some
 from algorithm_1 import algorithm_1
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from pruned_trees import train
 
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
@@ -30,7 +31,7 @@ from rebt_ros.beyond_the_paper.priority_root import reduced_tree
 from rebt_ros.beyond_the_paper.reductions import Reductions
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.fitted import TrainedTree
-from rebt_ros.decision_tree.training import fit, train
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind

@@ -10,12 +10,12 @@ import strategies as some
 from algorithm_1 import algorithm_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pruned_trees import train
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.beyond_the_paper.priority_root import reduced_tree
 from rebt_ros.decision_tree.encoding import Vocabulary
-from rebt_ros.decision_tree.training import train
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable

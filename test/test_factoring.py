@@ -7,7 +7,7 @@ import strategies as some
 from hypothesis import given, settings
 
 from rebt_ros.logic.conditions import Condition, IsTrue, Literal
-from rebt_ros.logic.dnf import TRUE, Dnf
+from rebt_ros.logic.dnf import Dnf
 from rebt_ros.logic.factoring import Factored, pull_out_common, unfactored
 from rebt_ros.logic.inverses import build_inv_set
 
@@ -58,7 +58,7 @@ def test_the_order_of_literals_and_conjunctions_stays(rule: Dnf) -> None:
 @pytest.mark.parametrize(
     ("rule", "factored"),
     [
-        (TRUE, Factored(())),
+        (some.TRUE, Factored(())),
         (some.dnf([A, B]), Factored((A, B))),
         (some.dnf([A, B], [A, C]), Factored((A,), (Factored((B,)), Factored((C,))))),
         (some.dnf([A, B], [C, D]), Factored((), (Factored((A, B)), Factored((C, D))))),

@@ -11,8 +11,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rebt_ros.logic.conditions import IsTrue, Literal, Threshold
-from rebt_ros.logic.dnf import FALSE, TRUE, Dnf, conditions_of
-from rebt_ros.logic.float_reduction import float_reduction, implies
+from rebt_ros.logic.dnf import FALSE, Dnf, conditions_of
+from rebt_ros.logic.float_reduction import float_reduction
 from rebt_ros.logic.minimize import minimize
 
 X2, X3, X5 = (some.at_most("distance", value) for value in (0.2, 0.3, 0.5))
@@ -80,10 +80,10 @@ def test_no_literal_of_a_conjunction_is_implied_by_another_and_no_conjunction_ei
     reduced = float_reduction(rule)
     for one in reduced:
         for literal in one:
-            assert not any(implies(other, literal) for other in one if other != literal)
+            assert not any(some.implies(other, literal) for other in one if other != literal)
         for other in reduced:
             if other != one:
-                assert not all(any(implies(mine, its) for mine in one) for its in other)
+                assert not all(any(some.implies(mine, its) for mine in one) for its in other)
 
 
 @settings(max_examples=50)
@@ -109,8 +109,8 @@ def test_minimized_rules_keep_their_truth_as_well(rule: Dnf) -> None:
         (some.dnf([X3, DOCKED], [X5, ~DOCKED]), some.dnf([X3, DOCKED], [X5, ~DOCKED])),
         (some.dnf([X3, Y3]), some.dnf([X3, Y3])),
         (some.dnf([X3, ~X2]), some.dnf([X3, ~X2])),
-        (some.dnf([X3], []), TRUE),
-        (TRUE, TRUE),
+        (some.dnf([X3], []), some.TRUE),
+        (some.TRUE, some.TRUE),
         (FALSE, FALSE),
     ],
 )
@@ -120,24 +120,24 @@ def test_known_rules(rule: Dnf, reduced: Dnf) -> None:
 
 @given(some.literals())
 def test_a_literal_implies_itself_and_not_its_negation(literal: Literal) -> None:
-    assert implies(literal, literal)
-    assert not implies(literal, ~literal)
+    assert some.implies(literal, literal)
+    assert not some.implies(literal, ~literal)
 
 
 @given(distance_literals, distance_literals, distance_literals)
 def test_implication_is_transitive(one: Literal, two: Literal, three: Literal) -> None:
-    assert not (implies(one, two) and implies(two, three)) or implies(one, three)
+    assert not (some.implies(one, two) and some.implies(two, three)) or some.implies(one, three)
 
 
 @given(distance_literals, distance_literals)
 def test_two_literals_that_imply_each_other_are_the_same(one: Literal, two: Literal) -> None:
-    assert (implies(one, two) and implies(two, one)) is (one == two)
+    assert (some.implies(one, two) and some.implies(two, one)) is (one == two)
 
 
 @settings(max_examples=300)
 @given(some.literals(), some.literals(some.thresholds()))
 def test_an_implication_holds_in_every_state(one: Literal, two: Literal) -> None:
-    if implies(one, two):
+    if some.implies(one, two):
         for place in PLACES:
             for state in ((place, place, 1.0, 1.0), (place, 0.0, 1.0, 1.0)):
                 before = ("go", "go")
@@ -156,18 +156,18 @@ def test_every_implication_between_thresholds_of_one_quantity_is_found(
         not some.holds(one, (place, 0, 0, 0)) or some.holds(two, (place, 0, 0, 0))
         for place in PLACES
     )
-    assert implies(one, two) is everywhere
+    assert some.implies(one, two) is everywhere
 
 
 @given(distance_literals, st.one_of(some.literals(some.thresholds("battery")), difference_literals))
 def test_thresholds_of_different_quantities_imply_nothing(one: Literal, two: Literal) -> None:
-    assert not implies(one, two)
-    assert not implies(two, one)
+    assert not some.implies(one, two)
+    assert not some.implies(two, one)
 
 
 def test_a_missing_value_lies_above_every_threshold() -> None:
     # So ~(x <= 0.3) implies ~(x <= 0.2) where x is missing, as both hold.
     missing = (math.nan, 0.0, 0.0, 0.0)
-    assert implies(~X3, ~X2)
+    assert some.implies(~X3, ~X2)
     assert some.holds(~X3, missing)
     assert some.holds(~X2, missing)

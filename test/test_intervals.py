@@ -10,6 +10,7 @@ import pytest
 import strategies as some
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from pruned_trees import train
 from py_trees.common import Status
 
 from rebt_ros.behavior_tree import nodes
@@ -19,7 +20,6 @@ from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.beyond_the_paper.priority_root import reduced_tree
 from rebt_ros.beyond_the_paper.reductions import ALL_REDUCTIONS
 from rebt_ros.decision_tree.encoding import Vocabulary
-from rebt_ros.decision_tree.training import train
 from rebt_ros.decision_tree.tree import DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable

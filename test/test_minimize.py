@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rebt_ros.logic.conditions import IsTrue, Literal
-from rebt_ros.logic.dnf import FALSE, TRUE, Conjunction, Dnf, conditions_of
+from rebt_ros.logic.dnf import FALSE, Conjunction, Dnf, conditions_of
 from rebt_ros.logic.minimize import minimize
 
 A, B, C = (Literal(IsTrue(name)) for name in "abc")
@@ -119,10 +119,10 @@ def test_literals_stand_in_the_order_in_which_their_conditions_first_occur(rule:
     ("rule", "minimized"),
     [
         (FALSE, FALSE),
-        (TRUE, TRUE),
-        (some.dnf([A], []), TRUE),
-        (some.dnf([A], [~A]), TRUE),
-        (some.dnf([A, B], [A, ~B], [~A, B], [~A, ~B]), TRUE),
+        (some.TRUE, some.TRUE),
+        (some.dnf([A], []), some.TRUE),
+        (some.dnf([A], [~A]), some.TRUE),
+        (some.dnf([A, B], [A, ~B], [~A, B], [~A, ~B]), some.TRUE),
         (some.dnf([A]), some.dnf([A])),
         (some.dnf([A, B], [A, ~B]), some.dnf([A])),
         (some.dnf([A, B], [A]), some.dnf([A])),
@@ -132,8 +132,8 @@ def test_literals_stand_in_the_order_in_which_their_conditions_first_occur(rule:
     ],
     ids=[
         "FALSE",
-        "TRUE",
-        "one conjunction is TRUE",
+        "some.TRUE",
+        "one conjunction is some.TRUE",
         "excluded middle",
         "all minterms",
         "single literal",
@@ -152,10 +152,10 @@ def test_known_rules(rule: Dnf, minimized: Dnf) -> None:
     ("rule", "dont_care", "minimized"),
     [
         (some.dnf([A, B]), some.dnf([A, ~B]), some.dnf([A])),
-        (some.dnf([A]), some.dnf([~A]), TRUE),
+        (some.dnf([A]), some.dnf([~A]), some.TRUE),
         (some.dnf([A, B]), some.dnf([C]), some.dnf([A, B])),
         (FALSE, some.dnf([A]), FALSE),
-        (TRUE, some.dnf([A]), TRUE),
+        (some.TRUE, some.dnf([A]), some.TRUE),
     ],
 )
 def test_known_rules_with_states_that_do_not_matter(
@@ -169,7 +169,7 @@ def test_known_rules_with_states_that_do_not_matter(
 @settings(max_examples=50)
 @given(rules)
 def test_where_nothing_matters_the_rule_is_constant(rule: Dnf) -> None:
-    assert minimize(rule, TRUE) in (TRUE, FALSE)
+    assert minimize(rule, some.TRUE) in (some.TRUE, FALSE)
 
 
 def test_a_rule_over_many_conditions_is_minimized() -> None:

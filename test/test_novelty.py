@@ -11,6 +11,7 @@ import pytest
 import strategies as some
 from hypothesis import given
 from hypothesis import strategies as st
+from pruned_trees import train
 
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.novelty import Departure, NoveltyDetector
@@ -23,7 +24,6 @@ from rebt_ros.behavior_tree.shown import (
 )
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.shown_rows import shown_rows
-from rebt_ros.decision_tree.training import train
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.learning.options import LearnOptions

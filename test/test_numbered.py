@@ -10,7 +10,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.beyond_the_paper.priority_root import size_of
 from rebt_ros.logic.dnf import Dnf, conditions_of
 from rebt_ros.logic.factoring import factored, named, pulled_out
-from rebt_ros.logic.float_reduction import implied_literals, implies, reduced
+from rebt_ros.logic.float_reduction import implied_literals, reduced
 from rebt_ros.logic.intervals import enclosing_literals, with_intervals
 from rebt_ros.logic.numbered import Numbering, mask
 from rebt_ros.paper.re_bt_espresso import rule_tree
@@ -29,7 +29,9 @@ def test_masks_tell_which_literals_imply_which(rule: Dnf) -> None:
     implied = implied_literals(numbering.conditions)
     literals = numbering.literals(range(len(implied)))
     for stronger, weaker in zip(literals, implied, strict=True):
-        assert weaker == mask(code for code, one in enumerate(literals) if implies(stronger, one))
+        assert weaker == mask(
+            code for code, one in enumerate(literals) if some.implies(stronger, one)
+        )
 
 
 @settings(max_examples=150)

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pruned_trees import train
 
 import rebt_ros
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.beyond_the_paper import priority_root
 from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
-from rebt_ros.decision_tree.training import fit, train
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.last_action import History
@@ -64,12 +65,12 @@ def test_a_policy_that_was_shown_is_learned() -> None:
 def test_the_previous_action_is_tested_only_where_that_raises_own_history_recall() -> None:
     auto = learn([there_and_back("one"), there_and_back("two")])
     assert auto.provenance.history is History.PREVIOUS
-    assert auto.provenance.uses_last_action
+    assert auto.provenance.history is not History.NONE
     assert auto.provenance.figures.own_history_agreement == 1.0
     assert auto.provenance.figures.mean_recall == 1.0
     plain = learn([turning_and_going("one", 1), turning_and_going("two", 2)])
     assert plain.provenance.history is History.NONE
-    assert not plain.provenance.uses_last_action
+    assert plain.provenance.history is History.NONE
 
 
 @pytest.mark.parametrize("history", History)

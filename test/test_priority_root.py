@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import strategies as some
 from hypothesis import given, settings
+from pruned_trees import train
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.beyond_the_paper.priority_root import reduced_tree
 from rebt_ros.beyond_the_paper.reductions import ALL_REDUCTIONS, Reductions
-from rebt_ros.decision_tree.training import train
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import IsTrue, Literal
 from rebt_ros.paper.rules import Rule, leaf_rules

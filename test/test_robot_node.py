@@ -14,11 +14,11 @@ pytest.importorskip("rclpy")
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from robot_episodes import run_episode
 from ros_processes import NodeProcess, Peer
 from std_msgs.msg import Float64MultiArray, String
 
 from rebt_ros.simulated_robot.demonstrator import decide
-from rebt_ros.simulated_robot.episode import run_episode
 from rebt_ros.simulated_robot.robot import Robot, State
 from rebt_ros.simulated_robot.world import furnished_room
 

@@ -28,7 +28,7 @@ from rebt_ros.learning.pipeline import learn_from
 from rebt_ros.learning.suggesting import suggest
 from rebt_ros.logic.conditions import Threshold
 from rebt_ros.storage.csv_table import read_csv
-from rebt_ros.study.edit_distance.bounds import min_distance
+from rebt_ros.study.edit_distance.bounds import distance_bounds
 from rebt_ros.study.edit_distance.labelled_tree import labelled
 from rebt_ros.study.simulator.configuration import (
     Act,
@@ -112,8 +112,8 @@ def missed(root: Group, routines: Sequence[FoundRoutine]) -> list[str]:
     for simulated in map(as_behavior_tree, root.children):
         wanted = labelled(simulated)
         assert wanted is not None
-        nearest = min_distance(wanted, offered)
-        if nearest is None or nearest.upper > 0:
+        nearest = min((distance_bounds(wanted, one).upper for one in offered), default=None)
+        if nearest != 0:
             apart.append(f"{one_line(simulated)}: {nearest}")
     return apart
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from robot_episodes import Policy, run_episode
 from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.behavior_tree.runtime import TreeRuntime
@@ -17,7 +18,7 @@ from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.learning.pipeline import learn
 from rebt_ros.simulated_robot.demonstrator import ENOUGH, decide
-from rebt_ros.simulated_robot.episode import EpisodeResult, Policy, run_episode
+from rebt_ros.simulated_robot.episode import EpisodeResult
 from rebt_ros.simulated_robot.robot import TIME_STEP, Action, Robot, State
 from rebt_ros.simulated_robot.world import Obstacle, Point, World, furnished_room
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 import strategies as some
+from pruned_trees import train
 from test_pipeline import there_and_back
 
 from rebt_ros.beyond_the_paper import single_loops
 from rebt_ros.decision_tree import training
 from rebt_ros.decision_tree.fitted import FittedTree
-from rebt_ros.decision_tree.training import train
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import OptionError
 from rebt_ros.learning import suggesting

@@ -9,12 +9,12 @@ import strategies as some
 from hypothesis import given
 from hypothesis import strategies as st
 from lat_examples import c, followers, rule
+from pruned_trees import train
 from test_lat_trees import CONDITIONS, Script, repeater, run, sequence
 
 from rebt_ros.behavior_tree import document, nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root, Suggestion, SuggestionKind, Unit
 from rebt_ros.behavior_tree.wording import how_often
-from rebt_ros.decision_tree.training import train
 from rebt_ros.errors import OptionError
 from rebt_ros.learning import suggesting
 from rebt_ros.learning.attaching import attach, going_on_after_loops, mark, resolve

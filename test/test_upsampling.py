@@ -8,11 +8,12 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from pruned_trees import train
 
 from rebt_ros.decision_tree import training
 from rebt_ros.decision_tree.encoding import MISSING, Indicator, Number, Vocabulary, columns, encode
 from rebt_ros.decision_tree.svm_smote import svm_smote
-from rebt_ros.decision_tree.training import fit, train
+from rebt_ros.decision_tree.training import fit
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind

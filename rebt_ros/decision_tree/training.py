@@ -22,7 +22,7 @@ from rebt_ros.decision_tree.encoding import (
     encode,
     encode_history,
 )
-from rebt_ros.decision_tree.fitted import FittedTree, TrainedTree
+from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.grown import GrownTree
 from rebt_ros.decision_tree.pruning import pruning_path
 from rebt_ros.decision_tree.svm_smote import Upsampled, svm_smote
@@ -243,26 +243,6 @@ def _grown(classifier: DecisionTreeClassifier, actions: int) -> GrownTree:
         tree.impurity * weights / weights[0],
         tree.apply,
     )
-
-
-def train(
-    table: DemonstrationTable,
-    *,
-    vocabulary: Vocabulary = FEATURES_ALONE,
-    max_depth: int | None = None,
-    ccp_alpha: float = 0.0,
-    random_state: int = 0,
-    upsample: Upsampling = Upsampling.NONE,
-) -> TrainedTree:
-    """Fits a decision tree and prunes it at `ccp_alpha`; see `fit`."""
-    fitted = fit(
-        table,
-        vocabulary=vocabulary,
-        max_depth=max_depth,
-        random_state=random_state,
-        upsample=upsample,
-    )
-    return fitted.at(ccp_alpha)
 
 
 def _notes(table: DemonstrationTable, more: Upsampled) -> Iterator[str]:

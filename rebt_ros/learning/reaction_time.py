@@ -80,11 +80,6 @@ class ReactionTime:
     by_states_alone: bool = True
     """Whether these are explanations by states alone; else the previous action is tested, too."""
 
-    @property
-    def is_clear(self) -> bool:
-        """Whether the demonstrator was found to be late."""
-        return self.rows > 0
-
 
 def given(table: DemonstrationTable, seconds: float) -> ReactionTime:
     """A reaction time that a person says.

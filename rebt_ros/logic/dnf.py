@@ -46,13 +46,7 @@ class Dnf:
     def __len__(self) -> int:
         return len(self.conjunctions)
 
-    @property
-    def is_true(self) -> bool:
-        """Whether a conjunction without literals makes it TRUE."""
-        return any(not conjunction.literals for conjunction in self.conjunctions)
 
-
-TRUE = Dnf((Conjunction(),))
 FALSE = Dnf()
 
 

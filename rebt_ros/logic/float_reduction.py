@@ -8,27 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from rebt_ros.logic.conditions import Condition, Literal, Quantity, Threshold
+from rebt_ros.logic.conditions import Condition, Quantity, Threshold
 from rebt_ros.logic.dnf import Dnf, conditions_of
 from rebt_ros.logic.numbered import Codes, Numbering, mask
-
-
-def implies(stronger: Literal, weaker: Literal) -> bool:
-    """Whether every state that satisfies `stronger` satisfies `weaker`.
-
-    >>> near, reachable = Literal(Threshold("x", 0.3)), Literal(Threshold("x", 0.5))
-    >>> implies(near, reachable), implies(reachable, near), implies(~reachable, ~near)
-    (True, False, True)
-    """
-    a, b = stronger.condition, weaker.condition
-    if (
-        isinstance(a, Threshold)
-        and isinstance(b, Threshold)
-        and a.quantity == b.quantity
-        and stronger.positive == weaker.positive
-    ):
-        return a.value <= b.value if stronger.positive else a.value >= b.value
-    return stronger == weaker
 
 
 def float_reduction(dnf: Dnf) -> Dnf:
@@ -44,7 +26,7 @@ def float_reduction(dnf: Dnf) -> Dnf:
 
 
 def implied_literals(conditions: Sequence[Condition]) -> list[int]:
-    """For each code, the mask of what it implies as in `implies`, itself included."""
+    """For each code, the mask of the literals that hold where it holds, itself included."""
     implied = [1 << code for code in range(2 * len(conditions))]
     of_quantity: dict[Quantity, list[tuple[float, int]]] = {}
     for position, condition in enumerate(conditions):

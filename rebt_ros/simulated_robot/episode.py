@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from rebt_ros.simulated_robot.robot import TIME_STEP, Robot
-
-#: Decides from a state what the robot does; None where it has nothing to say.
-Policy = Callable[[tuple[float, ...]], str | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,17 +64,3 @@ class Episode:
         """Lets one time step pass."""
         self.robot.step(action, self._time_step)
         self._steps += 1
-
-
-def run_episode(robot: Robot, policy: Policy, time_limit: float) -> EpisodeResult:
-    """Lets a policy drive the robot from where it stands to the end of the run.
-
-    Args:
-        robot: Stands at a start.
-        policy: Is asked once per time step.
-        time_limit: Simulated seconds.
-    """
-    episode = Episode(robot, time_limit)
-    while not episode.over:
-        episode.step(policy(robot.state))
-    return episode.result

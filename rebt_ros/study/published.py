@@ -16,4 +16,3 @@ REPEATER: Final = Share(106, 125)
 PSA: Final = Share(65, 95)
 REDUCTIONS: Final = Reductions(7.82, 31.25, 73.29)
 TREES: Final = 2250
-LOST: Final = 2

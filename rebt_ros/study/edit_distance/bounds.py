@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -21,7 +20,6 @@ from rebt_ros.study.edit_distance.canonical import (
     CanonicalTree,
     Integers,
     canonical,
-    canonical_order,
 )
 from rebt_ros.study.edit_distance.labelled_tree import LabelledTree
 from rebt_ros.study.edit_distance.pair import Pair, Swaps
@@ -66,41 +64,6 @@ def distance_bounds(first: LabelledTree, second: LabelledTree) -> Bounds:
     Bounds(lower=3, upper=3)
     """
     return _compared(*_ordered(canonical(first), canonical(second)))[0]
-
-
-def min_distance(first: LabelledTree, candidates: Iterable[LabelledTree]) -> Bounds | None:
-    """Bounds of the distance to the candidate that is closest; None where there are none.
-
-    The same as the smallest bounds of `distance_bounds`, but candidates whose sizes and labels
-    alone keep them farther away than another one are not looked at.
-    """
-    tree = canonical(first)
-    others = {canonical(candidate) for candidate in candidates}
-    best: Bounds | None = None
-    for least, other in sorted(
-        ((_least_distance(tree, other), other) for other in others),
-        key=lambda item: (item[0], item[1].code),
-    ):
-        if best is not None and least >= best.upper:
-            break
-        found, _ = _compared(*_ordered(tree, other))
-        best = found if best is None else _smaller(best, found)
-    return best
-
-
-def _smaller(one: Bounds, other: Bounds) -> Bounds:
-    return Bounds(min(one.lower, other.lower), min(one.upper, other.upper))
-
-
-def node_mapping(first: LabelledTree, second: LabelledTree) -> tuple[tuple[int, int], ...]:
-    """The nodes that the edit path keeps which costs the upper bound, each with its image."""
-    one, other = canonical(first), canonical(second)
-    small, large = _ordered(one, other)
-    images = _compared(small, large)[1]
-    trees = (first, second) if small is one else (second, first)
-    of_small, of_large = map(canonical_order, trees)
-    pairs = [(of_small[node], of_large[image]) for node, image in enumerate(images)]
-    return tuple(sorted(pairs if small is one else [(image, node) for node, image in pairs]))
 
 
 def _ordered(one: CanonicalTree, other: CanonicalTree) -> tuple[CanonicalTree, CanonicalTree]:

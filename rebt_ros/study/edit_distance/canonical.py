@@ -57,11 +57,6 @@ def canonical(tree: LabelledTree) -> CanonicalTree:
     )
 
 
-def canonical_order(tree: LabelledTree) -> tuple[int, ...]:
-    """Which node of the tree each node of the canonical form is."""
-    return _breadth_first(tree)[0]
-
-
 def _breadth_first(tree: LabelledTree) -> tuple[tuple[int, ...], str]:
     """The nodes, the children of each in the order of their codes; and the code of the root."""
     children: list[list[int]] = [[] for _ in tree.labels]

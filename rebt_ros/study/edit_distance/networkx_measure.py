@@ -101,12 +101,6 @@ class NetworkxMeasure:
             _end(process)
 
 
-def networkx_distance(first: LabelledTree, second: LabelledTree, seconds: float) -> float | None:
-    """The distance of one pair, for which a process is started; as `NetworkxMeasure.distance`."""
-    with NetworkxMeasure() as measure:
-        return measure.distance(first, second, seconds)
-
-
 def _started() -> subprocess.Popen[bytes]:
     package = Path(__file__).parents[2]
     paths = [str(package), os.environ.get("PYTHONPATH", "")]
