@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.format import read_array
 
 from rebt_ros.errors import InputError
 from rebt_ros.storage.atomic import write_bytes_atomically
@@ -55,16 +56,19 @@ def read_arrays(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]
         InputError: It cannot be read, is no such file, or is larger than `MOST_BYTES` unpacked.
     """
     try:
-        with zipfile.ZipFile(path) as members:
-            size = sum(member.file_size for member in members.infolist())
-        if size > MOST_BYTES:
-            raise InputError(
-                f"{path} takes {size / 1e6:.0f} MB unpacked, more than the {MOST_BYTES / 1e6:.0f} "
-                "that are read: learn again."
-            )
-        with np.load(path, allow_pickle=False) as found:
-            # A member that is no array comes as bytes.
-            arrays = {name: np.asarray(found[name]) for name in found.files}
+        with zipfile.ZipFile(path) as packed:
+            members = packed.infolist()
+            size = sum(member.file_size for member in members)
+            if size > MOST_BYTES:
+                raise InputError(
+                    f"{path} takes {size / 1e6:.0f} MB unpacked, more than the "
+                    f"{MOST_BYTES / 1e6:.0f} that are read: learn again."
+                )
+            arrays = {}
+            for member in members:
+                with packed.open(member) as file:
+                    name = member.filename.removesuffix(".npy")
+                    arrays[name] = read_array(file, allow_pickle=False)
         words = json.loads(arrays.pop(_WORDS).tobytes())
     except OSError as err:
         raise unreadable(path, err) from err
