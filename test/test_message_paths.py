@@ -456,6 +456,7 @@ def _product(
         ("os/msg/Path", "the package os of os/msg/Path is not installed"),
         ("../nav_msgs/msg/Odometry", "is no name of a message type"),
         ("nav_msgs/msg/GetMap", "the package nav_msgs has no message 'GetMap'"),
+        ("nav_msgs/srv/GetMap", "is no name of a message type"),
     ],
 )
 def test_a_type_that_is_not_installed_is_named_with_what_helps(name: str, said: str) -> None:

@@ -64,7 +64,7 @@ WRONG = [
     ),
     (
         f"{STATE}states: 1",
-        "line 2: states is unknown here; known are topics, state, actions",
+        "line 2: states is unknown here; known are topics, state, actions, commands",
     ),
     ("state:\n  x: /a.b\n  x: /a.c", "line 3: the key 'x' is there twice"),
     ("state: &a {x: /a.b}", "line 1: anchors (&) and aliases (*) are not read: write it out"),
@@ -144,6 +144,11 @@ actions:
   base: {twist: /cmd_vel, sectors: {go: 0, turn: 90}, rest: "", dead_band: 0.1, linear: 0.5,
          angular: 2, hysteresis: 5, emit: change}
   nav: {behavior_tree_log: /log, labels: {FollowPath: follow}}
+commands:
+  go: {publish: /cmd_vel, type: geometry_msgs/msg/Twist, message: {linear: {x: 0.25}}, when: once}
+  grasp: {call: /grasp, type: std_srvs/srv/Trigger}
+  dock: {action: /dock, type: nav2_msgs/action/DockRobot, goal: {dock_id: home}}
+  stop: {publish: /cmd_vel, type: geometry_msgs/msg/Twist, message: null}
 """
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from enum import Enum
 from importlib import resources
 from pathlib import Path
 from typing import Final
@@ -18,10 +19,14 @@ from rebt_ros.robot_file.robot_file import (
     ActionSource,
     AxisLabels,
     BehaviorTreeLogActions,
+    CallCommand,
+    Command,
     Emit,
+    GoalCommand,
     JoyActions,
     Json,
     PathActions,
+    PublishCommand,
     RobotFile,
     Stamp,
     StateFeature,
@@ -37,6 +42,13 @@ MOST: Final = 1000
 _SECTORS: Final[Mapping[str, float]] = {"forward": 0.0, "left": 90.0, "back": 180.0, "right": -90.0}
 _LARGEST_AGE: Final = 3600.0
 _MOST_BUTTONS: Final = 1000
+
+
+class _When(Enum):
+    """When a message is published."""
+
+    TICK = "tick"
+    ONCE = "once"
 
 
 def json_schema() -> Json:
@@ -89,7 +101,7 @@ def robot_file_of(content: Json, name: str) -> RobotFile:
 def _robot_file(place: Place, name: str, content: Json) -> RobotFile:
     if place.value is None:
         place.refuse("is empty: it needs a part 'state'")
-    fields = place.fields("topics", "state", "actions")
+    fields = place.fields("topics", "state", "actions", "commands")
     if "state" not in fields:
         place.refuse("needs a part 'state' that names the features")
     state = tuple(_feature(key, its) for key, its in _listed(fields["state"]))
@@ -106,7 +118,12 @@ def _robot_file(place: Place, name: str, content: Json) -> RobotFile:
     topics = (
         {key: _topic(its) for key, its in _listed(fields["topics"])} if "topics" in fields else {}
     )
-    robot = RobotFile(name, state, actions, topics, content)
+    commands = (
+        {key: _command(its) for key, its in _listed(fields["commands"])}
+        if "commands" in fields
+        else {}
+    )
+    robot = RobotFile(name, state, actions, topics, commands, content)
     used = {*robot.state_topics, *robot.action_topics}
     for key, its in _listed(fields["topics"]) if "topics" in fields else ():
         if key not in used:
@@ -271,6 +288,49 @@ def _log_actions(place: Place) -> ActionSource:
     return BehaviorTreeLogActions(fields["behavior_tree_log"].text(), labels)
 
 
+def _command(place: Place) -> Command:
+    kinds = [key for key, _ in place.items() if key in _COMMANDS]
+    if len(kinds) != 1:
+        place.refuse(f"needs one of {', '.join(_COMMANDS)}, which says what it does")
+    return _COMMANDS[kinds[0]](place)
+
+
+def _publish_command(place: Place) -> Command:
+    fields = _of_a_kind(place, "publish", "message", "when")
+    when = fields["when"].one_of(_When) if "when" in fields else _When.TICK
+    return PublishCommand(
+        fields["publish"].text(),
+        fields["type"].text(),
+        _content(fields, "message"),
+        when is _When.TICK,
+    )
+
+
+def _call_command(place: Place) -> Command:
+    fields = _of_a_kind(place, "call", "request")
+    return CallCommand(fields["call"].text(), fields["type"].text(), _content(fields, "request"))
+
+
+def _goal_command(place: Place) -> Command:
+    fields = _of_a_kind(place, "action", "goal")
+    return GoalCommand(fields["action"].text(), fields["type"].text(), _content(fields, "goal"))
+
+
+def _of_a_kind(place: Place, name: str, *others: str) -> dict[str, Place]:
+    fields = place.fields(name, "type", *others)
+    if "type" not in fields:
+        place.refuse("needs a 'type', such as geometry_msgs/msg/Twist")
+    return fields
+
+
+def _content(fields: Mapping[str, Place], name: str) -> Json:
+    if name not in fields or fields[name].value is None:
+        return {}
+    # Whatever is no map is refused.
+    dict(fields[name].items())
+    return fields[name].value
+
+
 def _labels(fields: Mapping[str, Place], name: str) -> dict[str, str]:
     return {key: label for key, (_, label) in _places(fields, name).items()}
 
@@ -285,4 +345,11 @@ _SOURCES: Final[Mapping[str, Callable[[Place], ActionSource]]] = {
     "joy": _joy_actions,
     "twist": _twist_actions,
     "behavior_tree_log": _log_actions,
+}
+
+#: What a command is by the key that names its topic, service or server.
+_COMMANDS: Final[Mapping[str, Callable[[Place], Command]]] = {
+    "publish": _publish_command,
+    "call": _call_command,
+    "action": _goal_command,
 }

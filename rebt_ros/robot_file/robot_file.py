@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.message_path.path import MessagePath
@@ -132,8 +132,47 @@ ActionSource: TypeAlias = PathActions | JoyActions | TwistActions | BehaviorTree
 
 
 @dataclass(frozen=True, slots=True)
+class PublishCommand:
+    """A message that is published."""
+
+    topic: str
+    kind: str
+    """Name of its type."""
+    content: Json = field(default_factory=dict)
+    """Values of its fields; all others are 0 or empty."""
+    each_tick: bool = True
+    """Whether at every tick while it is what is commanded, or once when it begins to be."""
+
+
+@dataclass(frozen=True, slots=True)
+class CallCommand:
+    """A service that is called; the action runs until it answers."""
+
+    service: str
+    kind: str
+    content: Json = field(default_factory=dict)
+    """Values of the request's fields."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoalCommand:
+    """A goal of an action server; the action runs until there is a result."""
+
+    server: str
+    kind: str
+    content: Json = field(default_factory=dict)
+    """Values of the goal's fields."""
+
+
+Command: TypeAlias = PublishCommand | CallCommand | GoalCommand
+
+#: The command that is also sent when the tree is halted, disabled or stale.
+STOP: Final = "stop"
+
+
+@dataclass(frozen=True, slots=True)
 class RobotFile:
-    """Where features and actions are."""
+    """Where features and actions are, and what labels do."""
 
     name: str = field(compare=False)
     """Name of the file, for messages."""
@@ -141,6 +180,8 @@ class RobotFile:
     actions: Mapping[str, ActionSource]
     """By channel."""
     topics: Mapping[str, TopicSettings] = field(default_factory=dict)
+    commands: Mapping[str, Command] = field(default_factory=dict)
+    """By label."""
     content: Json = field(default=None, compare=False)
     """What it was read from, for recordings and trees to carry."""
 

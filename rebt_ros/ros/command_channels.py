@@ -15,6 +15,7 @@ from std_msgs.msg import String
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.errors import DocumentError
 from rebt_ros.live.action_results import ActionResults
+from rebt_ros.ros.executor.robot_commands import RobotCommands
 
 #: Of the topic on which the executor says whether it drives; who comes later hears the latest.
 DRIVING_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -44,6 +45,7 @@ class CommandChannels:
         result_topic: Where the robot says how actions ended; empty if they are done at once.
         every_tick: Whether a command is sent at every tick, or only when it changes.
         not_understood: Told of results that are no results.
+        robot: What labels do beside being sent; None for nothing.
     """
 
     def __init__(
@@ -52,7 +54,9 @@ class CommandChannels:
         result_topic: str,
         every_tick: bool,
         not_understood: Callable[[str], None],
+        robot: RobotCommands | None = None,
     ) -> None:
+        self._robot = robot
         self._node = node
         self._result_topic = result_topic
         self._every_tick = every_tick
@@ -109,6 +113,8 @@ class CommandChannels:
         for channel in self._channels.values():
             if channel.results:
                 channel.results.begin_tick()
+        if self._robot is not None:
+            self._robot.begin_tick()
 
     def send(self, commands: Sequence[nodes.Action]) -> int:
         """Sends the commands of a tick, at most one for each channel.
@@ -116,9 +122,18 @@ class CommandChannels:
         Returns:
             How many commands went out.
         """
+        if self._robot is not None:
+            for one in commands:
+                begins = self._channels[one.channel].sent != one.label
+                self._robot.send(one.label, begins=begins)
         return sum(
             self._channels[one.channel].send(one.label, self._every_tick) for one in commands
         )
+
+    def stop(self) -> None:
+        """Does what the robot file says is to be done when the tree is halted."""
+        if self._robot is not None:
+            self._robot.stop()
 
     def send_to_all(self, label: str) -> None:
         """Sends a command that is none of the tree's on every channel."""
@@ -132,11 +147,16 @@ class CommandChannels:
 
     def update(self, action: nodes.Action) -> Status:
         """How it goes with an action: done at once, or as the robot says."""
+        long = None if self._robot is None else self._robot.update(action.label)
+        if long is not None:
+            return long
         results = self._channels[action.channel].results
         return results.update(action) if results else Status.SUCCESS
 
     def halt(self, action: nodes.Action) -> None:
         """An action is interrupted."""
+        if self._robot is not None:
+            self._robot.halt(action.label)
         channel = self._channels.get(action.channel)
         if channel and channel.results:
             channel.results.halt(action)

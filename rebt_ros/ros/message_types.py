@@ -12,8 +12,8 @@ from typing import Any, Final
 from rebt_ros.message_path.definition import FILLER, Field, MessageType, Primitive
 from rebt_ros.message_path.errors import MessagePathError
 
-#: Package and name of a message type.
-_NAME: Final = re.compile(r"([a-z][a-z0-9_]*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
+#: Package and name of a type.
+_NAME: Final = re.compile(r"([a-z][a-z0-9_]*)/(?:(msg|srv|action)/)?([A-Za-z]\w*)", re.ASCII)
 _SEQUENCE: Final = re.compile(r"sequence<(.+?)(?:, \d+)?>")
 _ARRAY: Final = re.compile(r"(.+)\[\d+\]")
 
@@ -40,26 +40,44 @@ def message_class(name: str) -> type[Any]:
     Raises:
         MessagePathError: It is not installed, and so on: one sentence says what is.
     """
+    found = _class(name, "msg", "message", "nav_msgs/msg/Odometry")
+    if not hasattr(found, "get_fields_and_field_types"):
+        raise MessagePathError(f"{name} is no message.")
+    return found
+
+
+@cache
+def service_class(name: str) -> type[Any]:
+    """The class of a service type, such as ``std_srvs/srv/Trigger``; see `message_class`."""
+    return _class(name, "srv", "service", "std_srvs/srv/Trigger")
+
+
+@cache
+def action_class(name: str) -> type[Any]:
+    """The class of an action type, such as ``nav2_msgs/action/Spin``; see `message_class`."""
+    return _class(name, "action", "action", "nav2_msgs/action/Spin")
+
+
+def _class(name: str, interface: str, noun: str, example: str) -> type[Any]:
+    """The class of a type of an interface, which messages call by a noun."""
     match = _NAME.fullmatch(name)
-    if match is None:
-        raise MessagePathError(
-            f"{name!r} is no name of a message type: write it as nav_msgs/msg/Odometry."
-        )
-    package, kind = match.groups()
-    if not _has_messages(package):
+    if match is None or match[2] not in (None, interface):
+        raise MessagePathError(f"{name!r} is no name of a {noun} type: write it as {example}.")
+    package, kind = match[1], match[3]
+    if not _has(package, interface):
         raise MessagePathError(
             f"the package {package} of {name} is not installed: install "
             f"ros-jazzy-{package.replace('_', '-')}, or source the workspace that it is built in."
         )
     try:
-        module = import_module(f"{package}.msg")
+        module = import_module(f"{package}.{interface}")
     except Exception as err:  # whatever a broken installation raises
         raise MessagePathError(
-            f"the messages of the package {package} cannot be loaded ({err}): install it again."
+            f"the {noun} types of the package {package} cannot be loaded ({err}): install it again."
         ) from err
     found = getattr(module, kind, None)
-    if not isinstance(found, type) or not hasattr(found, "get_fields_and_field_types"):
-        raise MessagePathError(f"the package {package} has no message {kind!r}.")
+    if not isinstance(found, type):
+        raise MessagePathError(f"the package {package} has no {noun} {kind!r}.")
     return found
 
 
@@ -83,11 +101,11 @@ def installed(name: str) -> MessageType:
     )
 
 
-def _has_messages(package: str) -> bool:
+def _has(package: str, interface: str) -> bool:
     # The package itself is not loaded: the name may come from a document, and be that of anything.
     spec = find_spec(package)
     places = spec.submodule_search_locations if spec else None
-    return any(Path(place, "msg", "__init__.py").exists() for place in places or ())
+    return any(Path(place, interface, "__init__.py").exists() for place in places or ())
 
 
 def _constants(kind: type[Any]) -> dict[str, int]:

@@ -28,8 +28,8 @@ def robot_file(declare: Parameters) -> RobotFile | None:
     path = declare.text(
         "robot_file",
         "",
-        "Robot file that says where features and actions are in messages of any type; empty for "
-        "none.",
+        "Robot file that says where features and actions are in messages of any type, and what "
+        "labels do; empty for none.",
     )()
     return read_robot_file(at_home("robot_file", path)) if path else None
 

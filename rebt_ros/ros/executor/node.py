@@ -32,10 +32,11 @@ from rebt_ros.live.tree_inputs import Message
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.command_channels import DRIVING_QOS, CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
+from rebt_ros.ros.executor.robot_commands import RobotCommands
 from rebt_ros.ros.executor.robot_inputs import RobotInputs
 from rebt_ros.ros.executor.settings import declare_settings
 from rebt_ros.ros.executor.tree_program import Preparation, TreeProgram
-from rebt_ros.ros.graph_watch import GraphWatch
+from rebt_ros.ros.graph_watch import Finding, GraphWatch
 from rebt_ros.ros.topic_names import check_topics
 from rebt_ros.storage.tree_file import read_tree
 
@@ -74,8 +75,15 @@ class ExecutorNode(Node):
         super().__init__("executor")
         self._settings = settings = declare_settings(self)
         self._faults = Faults(self.get_logger())
+        self._robot_commands = (
+            RobotCommands(self, settings.robot, self._note_command) if settings.robot else None
+        )
         self._channels = CommandChannels(
-            self, settings.action_result_topic, settings.every_tick, self._note_result
+            self,
+            settings.action_result_topic,
+            settings.every_tick,
+            self._note_result,
+            self._robot_commands,
         )
         # Open before there is a tree, whose first command may then be heard.
         self._channels.follow([DEFAULT_CHANNEL])
@@ -344,6 +352,9 @@ class ExecutorNode(Node):
             "send 'success' or 'failure', or 'label:success' or 'label:failure'.",
         )
 
+    def _note_command(self, text: str) -> None:
+        self._faults.note("failed command", f"{text}.")
+
     # --- what goes out ---
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
@@ -403,6 +414,8 @@ class ExecutorNode(Node):
         """Halts the tree, and the robot; what is commanded next is sent, be it what was last."""
         self._interrupt()
         self._channels.rest()
+        if self._moving:
+            self._channels.stop()
         if self._moving and self._settings.halt_action:
             self._channels.send_to_all(self._settings.halt_action)
             for history in self._histories.values():
@@ -526,6 +539,7 @@ class ExecutorNode(Node):
             *watch.misfits([self._documents]),
             *(finding for robot in self._robots.values() for finding in robot.look()),
             *(one for topic in commands for one in watch.several(topic, "commands", _STOP_OTHERS)),
+            *self._without_command(),
         ]
         if self._settings.learner:
             findings += watch.unheard([self._documents])
@@ -536,6 +550,15 @@ class ExecutorNode(Node):
                 *watch.unread(commands),
             ]
         return watch.say(findings)
+
+    def _without_command(self) -> list[Finding]:
+        """Labels of the tree for which the robot file has no command."""
+        if self._program is None or self._robot_commands is None or self._settings.robot is None:
+            return []
+        labels = {one.label for one in nodes.actions(self._program.learned.tree)}
+        found = ", ".join(map(repr, self._robot_commands.missing(sorted(labels))))
+        sentence = f"{self._settings.robot.name} has no command for {found}"
+        return [Finding(sentence, waits=False)] if found else []
 
 
 def main(args: list[str] | None = None) -> None:

@@ -11,7 +11,9 @@ from rclpy.validate_topic_name import validate_topic_name
 
 from rebt_ros.errors import OptionError
 from rebt_ros.live.novelty_guard import Novelty
+from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.ros.parameters import Parameters, at_home, nanoseconds
+from rebt_ros.ros.robot_files import robot_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,8 @@ class ExecutorSettings:
     """What the executor was started with; durations in nanoseconds."""
 
     tree_file: Path | None
+    robot: RobotFile | None
+    """What labels do; None where they are only sent."""
     rules_file: Path | None
     """Rules that every tree must keep."""
     learner: str
@@ -106,6 +110,7 @@ def declare_settings(node: Node) -> ExecutorSettings:
         _check_node(learner)
     settings = ExecutorSettings(
         tree_file=at_home("tree_file", tree_file) if tree_file else None,
+        robot=robot_file(declare),
         rules_file=at_home("rules_file", rules_file) if rules_file else None,
         learner=learner,
         rate=rate,
