@@ -72,6 +72,7 @@ HOMES: Final = {
     "py_trees": (
         "rebt_ros.behavior_tree.runtime",
         "rebt_ros.live.action_results",
+        "rebt_ros.live.long_command",
         "rebt_ros.ros.*",
         "rebt_ros.study.simulator.py_trees_form",
     ),

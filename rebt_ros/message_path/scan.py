@@ -66,34 +66,36 @@ class Beams:
 
     def ranges(self, scan: Scan) -> FloatArray:
         """The ranges, NaN where one is missing; shape (beams,)."""
-        part, known = self._read(scan)
-        return np.where(known, np.minimum(part, _most(scan)), np.nan)
+        known = _known(scan)
+        chosen = self._chosen(scan, len(known))
+        missing = known[chosen] == math.inf
+        return np.where(missing, np.nan, np.minimum(known[chosen], _most(scan)))
 
     def least(self, scan: Scan) -> float | None:
         """The smallest of the ranges; None where all are missing."""
-        part, known = self._read(scan)
-        there = part[known]
-        return min(float(there.min()), _most(scan)) if there.size else None
+        known = _known(scan)
+        part = known[self._chosen(scan, len(known))]
+        smallest = float(part.min()) if part.size else math.inf
+        return None if smallest == math.inf else min(smallest, _most(scan))
 
     def largest(self, scan: Scan) -> float | None:
         """The largest of the ranges; None where all are missing."""
-        part, known = self._read(scan)
-        there = part[known]
+        there = self._there(scan)
         return min(float(there.max()), _most(scan)) if there.size else None
 
     def mean(self, scan: Scan) -> float | None:
         """The mean of the ranges; None where all are missing."""
-        part, known = self._read(scan)
-        there = part[known]
+        there = self._there(scan)
         if not there.size:
             return None
         return float(np.minimum(there, _most(scan)).mean(dtype=np.float64))
 
-    def _read(self, scan: Scan) -> tuple[Any, Any]:
-        """The beams' ranges as they are in the message, and which of them are not missing."""
-        ranges = np.asarray(scan.ranges)
-        part = ranges[self._chosen(scan, len(ranges))]
-        return part, part >= scan.range_min
+    def _there(self, scan: Scan) -> FloatArray:
+        """The ranges that are not missing."""
+        known = _known(scan)
+        part = known[self._chosen(scan, len(known))]
+        there: FloatArray = part[part < math.inf]
+        return there
 
     def _between(self, scan: Scan, count: int) -> slice | NDArray[np.intp]:
         """The beams between two angles."""
@@ -102,6 +104,25 @@ class Beams:
             self._known = key
             self._beams = _between(self._first, self._last, *key)
         return self._beams
+
+
+#: The scan that was read last, with its known ranges: several paths read one after the other.
+_latest: tuple[Scan | None, FloatArray] = (None, np.zeros(0))
+
+
+def _known(scan: Scan) -> FloatArray:
+    """All ranges; infinite ones are missing, and those beyond range_max finite."""
+    global _latest
+    latest, known = _latest
+    if latest is not scan:
+        ranges = np.asarray(scan.ranges)
+        beyond = _most(scan)
+        # Neither is true of NaN.
+        known = np.where(ranges >= scan.range_min, ranges, np.float32(math.inf))
+        if beyond < math.inf:
+            known[ranges > beyond] = beyond
+        _latest = (scan, known)
+    return known
 
 
 def _most(scan: Scan) -> float:

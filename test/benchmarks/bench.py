@@ -21,6 +21,7 @@ import checking
 import learning
 import node_rows
 import reading
+import robot_reading
 import running
 from harness import CHECKOUT, Figure, Settings, table, write
 
@@ -29,6 +30,7 @@ ROWS: dict[str, Callable[[Settings], list[Figure]]] = {
     "predict": running.predict,
     "check": checking.check_rules,
     "bag": reading.bag,
+    "robot-bag": robot_reading.robot_bag,
     "recording": reading.recording,
     "rules": learning.rules,
     "relearn": learning.relearn,
