@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from rebt_ros.offline.learning_from_files import learn
     from rebt_ros.offline.replay_over_files import replay
     from rebt_ros.offline.result import OfflineLearning
+    from rebt_ros.robot_file.robot_file import RobotFile
     from rebt_ros.storage.account import Account
     from rebt_ros.storage.inputs import InputOptions
 
@@ -100,6 +101,7 @@ __all__ = [
     "Reductions",
     "Repeater",
     "Replay",
+    "RobotFile",
     "Root",
     "RowKind",
     "Selector",
@@ -158,6 +160,7 @@ _HOMES = {
     "Reductions": "rebt_ros.beyond_the_paper.reductions",
     "Repeater": "rebt_ros.behavior_tree.nodes",
     "Replay": "rebt_ros.learning.replaying",
+    "RobotFile": "rebt_ros.robot_file.robot_file",
     "Root": "rebt_ros.behavior_tree.learned_tree",
     "RowKind": "rebt_ros.demonstration.demonstration",
     "Selector": "rebt_ros.behavior_tree.nodes",

@@ -17,7 +17,7 @@ import rebt_ros
 _CHECKOUT = Path(rebt_ros.__file__).resolve().parents[1]
 
 #: What a tree was made of is there to be looked into, by those who know the modules.
-_INNER = frozenset({rebt_ros.Learning})
+_INNER = frozenset({rebt_ros.Learning, rebt_ros.RobotFile})
 
 
 def _classes_in(hint: object) -> Iterator[type]:
