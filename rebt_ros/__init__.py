@@ -42,9 +42,11 @@ if TYPE_CHECKING:
     from rebt_ros.export.btcpp import to_btcpp
     from rebt_ros.learning.learning import Learning
     from rebt_ros.learning.learning_file import load_learning
+    from rebt_ros.learning.named_states import State
     from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
-    from rebt_ros.learning.policy import Decision, Policy, State
+    from rebt_ros.learning.policy import Decision, Policy
     from rebt_ros.learning.progress import Progress
+    from rebt_ros.learning.py_trees_form import to_py_trees
     from rebt_ros.learning.replaying import Disagreement, Replay
     from rebt_ros.logic.conditions import (
         Difference,
@@ -120,6 +122,7 @@ __all__ = [
     "load_learning",
     "replay",
     "to_btcpp",
+    "to_py_trees",
 ]
 
 _HOMES = {
@@ -168,7 +171,7 @@ _HOMES = {
     "ShownChannel": "rebt_ros.behavior_tree.shown",
     "ShownLeaf": "rebt_ros.behavior_tree.shown",
     "Span": "rebt_ros.behavior_tree.shown",
-    "State": "rebt_ros.learning.policy",
+    "State": "rebt_ros.learning.named_states",
     "StateTopic": "rebt_ros.demonstration.builder",
     "Suggestion": "rebt_ros.behavior_tree.learned_tree",
     "SuggestionKind": "rebt_ros.behavior_tree.learned_tree",
@@ -179,6 +182,7 @@ _HOMES = {
     "load_learning": "rebt_ros.learning.learning_file",
     "replay": "rebt_ros.offline.replay_over_files",
     "to_btcpp": "rebt_ros.export.btcpp",
+    "to_py_trees": "rebt_ros.learning.py_trees_form",
 }
 
 

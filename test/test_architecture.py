@@ -71,6 +71,7 @@ HOMES: Final = {
     "networkx": ("rebt_ros.paper.lat_*", "rebt_ros.study.edit_distance.networkx_worker"),
     "py_trees": (
         "rebt_ros.behavior_tree.runtime",
+        "rebt_ros.learning.py_trees_form",
         "rebt_ros.live.action_results",
         "rebt_ros.live.long_command",
         "rebt_ros.ros.*",

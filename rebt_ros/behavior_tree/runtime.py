@@ -105,6 +105,8 @@ class TreeRuntime:
         commander: Carries out the actions.
         tree: What to run instead of ``learned.tree``, such as its `executable` form.
         histories: Histories to go on with, by channel, as when one tree follows another.
+        carry_out: Makes the behaviour that carries out an action, once for each of its places in
+            the tree; instead of the commander.
     """
 
     def __init__(
@@ -113,12 +115,14 @@ class TreeRuntime:
         commander: Commander | None = None,
         tree: nodes.Node | None = None,
         histories: Mapping[str, ActionHistory] | None = None,
+        carry_out: Callable[[nodes.Action], py_trees.behaviour.Behaviour] | None = None,
     ) -> None:
         self.learned = learned
         self.histories = {action.channel: ActionHistory() for action in learned.actions}
         """What was taken on each channel, by the tree or by others who note it here."""
         self.histories.update(histories or {})
         self._commander = SucceedAtOnce() if commander is None else commander
+        self._carry_out = carry_out
         self._state: Sequence[float] = ()
         self._ticked: list[_Ticked] = []
         # Of trees that were learned from events, what runs on each channel.
@@ -137,9 +141,26 @@ class TreeRuntime:
         Args:
             state: Encoded values in the order of the learned tree's features (see `StateEncoder`).
         """
+        self.begin(state)
+        self.root.tick_once()
+        done = self.finish()
+        return Tick(
+            self.root.status,
+            tuple([one.action for one in self._ticked]),
+            tuple({one.action.channel: one.action for one in done}.values()),
+        )
+
+    def begin(self, state: Sequence[float]) -> None:
+        """Begins a tick of `root` that something else does, as a tree that it is a part of."""
         self._state = state
         self._ticked.clear()
-        self.root.tick_once()
+
+    def finish(self) -> Sequence[_Ticked]:
+        """Ends such a tick: what was done is noted.
+
+        Returns:
+            Those that had their channel one after the other.
+        """
         done = _in_turn(self._ticked)
         # Afterwards, so that all conditions of one tick see the same history.
         for one in done:
@@ -147,11 +168,7 @@ class TreeRuntime:
         if self._running:
             # What ran and was not ticked was interrupted, and nothing has taken its place.
             self._end(self._running.keys() - {one.action.channel for one in done})
-        return Tick(
-            self.root.status,
-            tuple([one.action for one in self._ticked]),
-            tuple({one.action.channel: one.action for one in done}.values()),
-        )
+        return done
 
     def _note(self, action: nodes.Action, status: Status) -> None:
         history = self.histories[action.channel]
@@ -182,6 +199,10 @@ class TreeRuntime:
     def halt(self) -> None:
         """Interrupts whatever runs; the next tick starts afresh, with the same histories."""
         self.root.stop(Status.INVALID)
+        self.interrupted()
+
+    def interrupted(self) -> None:
+        """Notes that `root` was interrupted, and with it whatever ran."""
         self._end(set(self._running))
 
     def snapshot(self) -> tuple[str, ...]:
@@ -234,7 +255,10 @@ class TreeRuntime:
                 holds = self._test_condition(literal.condition, history)
                 return _Test(name, holds, positive=literal.positive)
             case nodes.Action():
-                return _Command(name, node, next(self._ranks), self._commander, self._ticked)
+                rank = next(self._ranks)
+                if self._carry_out is not None:
+                    return _Noted(name, self._carry_out(node), node, rank, self._ticked)
+                return _Command(name, node, rank, self._commander, self._ticked)
             case nodes.Inverter():
                 return py_trees.decorators.Inverter(name=name, child=children[0])
             case nodes.Sequence(memory=memory):
@@ -366,6 +390,28 @@ class _Command(_Leaf):
         # py_trees may terminate a behaviour twice; only a running action is interrupted.
         if new_status is Status.INVALID and self.status is Status.RUNNING:
             self._commander.halt(self._action)
+
+
+class _Noted(py_trees.decorators.Decorator):
+    """An action that a behaviour from outside carries out."""
+
+    def __init__(
+        self,
+        name: str,
+        child: py_trees.behaviour.Behaviour,
+        action: nodes.Action,
+        rank: int,
+        ticked: list[_Ticked],
+    ) -> None:
+        super().__init__(name=name, child=child)
+        self._action = action
+        self._rank = rank
+        self._ticked = ticked
+
+    def update(self) -> Status:
+        status = self.decorated.status
+        self._ticked.append(_Ticked(self._action, status, self._rank))
+        return status
 
 
 class StateEncoder:

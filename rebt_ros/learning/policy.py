@@ -6,9 +6,8 @@ before, LAT, and the states that lagged features look back at.
 
 from __future__ import annotations
 
-import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -20,16 +19,11 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.prediction import Plan, States, holds_after
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
-from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.demonstration.table import category
 from rebt_ros.errors import InputError
+from rebt_ros.learning.named_states import Encoding, State
 from rebt_ros.logic.conditions import HistoryCondition
 from rebt_ros.storage.tree_file import read_tree
 
-#: A value of a feature: a number, a truth value, a category, or None where it is missing.
-Value: TypeAlias = float | bool | str | None
-#: Values by the names of the features, or in the order of the features.
-State: TypeAlias = Mapping[str, Value] | Sequence[Value]
 #: A label; None where the tree does nothing.  With several channels, one for each.
 Decision: TypeAlias = str | dict[str, str | None] | None
 
@@ -54,7 +48,7 @@ class Policy:
     def __init__(self, tree: LearnedTree | str | Path) -> None:
         self.learned = tree if isinstance(tree, LearnedTree) else read_tree(Path(tree))
         """The tree."""
-        self._encoding = _Encoding(self.learned.features)
+        self._encoding = Encoding(self.learned.features)
         root = executable(self.learned.tree)
         self._channels = nodes.policies(root)
         self._ticked = not all(map(nodes.is_reactive, self._channels.values()))
@@ -172,65 +166,3 @@ class _Episode:
         assert self._runtime is not None
         commands = {one.channel: one.label for one in self._runtime.tick(state).commands}
         return {channel: commands.get(channel) for channel in self._channels}
-
-
-class _Encoding:
-    """States as a tree reads them: numbers, 0 or 1, positions in a feature's categories, NaN."""
-
-    def __init__(self, features: Sequence[Feature]) -> None:
-        present = [feature for feature in features if not feature.lag]
-        self.names = tuple(feature.name for feature in present)
-        self._present = present
-        self._codes = [
-            {name: float(code) for code, name in enumerate(feature.categories)}
-            for feature in present
-        ]
-        # `with_lags` has the features of the present row, then all of one row before, and so on.
-        self._count = len(present)
-        self._sources = [
-            (feature.lag, place % self._count) for place, feature in enumerate(features)
-        ]
-
-    def present(self, state: State) -> list[float]:
-        """The values of the features that do not look back."""
-        if isinstance(state, Mapping):
-            unknown = sorted(set(state) - set(self.names))
-            if unknown:
-                raise InputError(
-                    f"the state has {unknown[0]!r}, which is no feature of the tree: "
-                    f"it has {', '.join(self.names)}."
-                )
-            values = [state.get(name) for name in self.names]
-        else:
-            values = list(state)
-            if len(values) != self._count:
-                raise InputError(
-                    f"the state has {len(values)} values where the tree has {self._count} "
-                    f"features: {', '.join(self.names)}."
-                )
-        return [
-            self._number(feature, codes, value)
-            for feature, codes, value in zip(self._present, self._codes, values, strict=True)
-        ]
-
-    def row(self, now: list[float], past: Sequence[list[float]]) -> list[float]:
-        """The values of all features."""
-        return [
-            now[place] if not lag else past[lag - 1][place] if lag <= len(past) else math.nan
-            for lag, place in self._sources
-        ]
-
-    def _number(self, feature: Feature, codes: Mapping[str, float], value: Value) -> float:
-        if value is None:
-            return math.nan
-        if feature.kind is FeatureKind.CATEGORICAL:
-            # Categories that were never shown are as good as missing, like on the robot.
-            if isinstance(value, bool) and str(value) in codes:
-                return codes[str(value)]
-            text = value if isinstance(value, str) else category(float(value))
-            return codes.get(text, math.nan)
-        if isinstance(value, str):
-            raise InputError(
-                f"the feature {feature.name!r} is {feature.kind.value}, not the text {value!r}."
-            )
-        return float(value)
