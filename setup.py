@@ -122,6 +122,7 @@ setup(
             f"replay = {PACKAGE}.commands.replay:main",
             f"revise = {PACKAGE}.commands.revise:main",
             f"show = {PACKAGE}.commands.show:main",
+            f"suggest-rules = {PACKAGE}.commands.suggest_rules:main",
             f"simulate = {PACKAGE}.commands.simulate:main",
             f"trial = {PACKAGE}.commands.trial:main",
             *(f"{node} = {PACKAGE}.ros.entry:{node}" for node in NODES),

@@ -127,6 +127,19 @@ def test_a_tree_that_breaks_a_rule_is_refused_before_the_swap(
         assert {one.data for one in robot.commands} == {"go"}
 
 
+def test_the_last_tick_is_explained(domain: int, peer: Peer, tmp_path: Path) -> None:
+    with NodeProcess("executor_node", domain, tmp_path, {"enabled": True}):
+        answer = peer.call("/executor/explain")
+        assert not answer.success
+        assert answer.message == "there was no tick yet: waiting for a tree."
+        publish(peer, learned(where_x_is_small(GO, TURN)))
+        robot = Robot(peer)
+        robot.obeys("go")
+        answer = peer.call("/executor/explain")
+        assert answer.success
+        assert answer.message.splitlines()[:2] == ["go", "  because x ≤ 0.5 (x = 0)"]
+
+
 def test_rules_that_cannot_be_read_keep_the_executor_from_starting(
     domain: int, tmp_path: Path
 ) -> None:

@@ -37,7 +37,7 @@ def test_the_action_is_what_a_tick_commands_and_each_change_leads_to_what_it_say
         return next(iter(runtime.tick(values).commands), None)
 
     assert explained.action == commanded(state, ActionHistory(earlier))
-    for flip in explained.flips:
+    for flip in explained.flips or ():
         history = ActionHistory(earlier)
         if flip.feature is None and flip.point.before is not None:
             history = flip.point.before.history()

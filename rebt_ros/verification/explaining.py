@@ -61,9 +61,9 @@ class Explanation:
     """What is commanded; None: nothing."""
     support: Support | None
     """None where rows are not at hand, or nothing is commanded."""
-    flips: tuple[Flip, ...]
+    flips: tuple[Flip, ...] | None
     """The least change of each feature that suffices by itself, the smallest first; where there is
-    none, the least change of several."""
+    none, the least change of several; None where they were not looked for."""
     grid: Grid
 
 
@@ -72,6 +72,8 @@ def explain(
     values: Sequence[float],
     histories: Mapping[str, ActionHistory] | None = None,
     tables: Sequence[DemonstrationTable] = (),
+    *,
+    changes: bool = True,
 ) -> tuple[Explanation, ...]:
     """Why a tree does in a state what it does, channel by channel.
 
@@ -80,6 +82,8 @@ def explain(
         values: One for each of its features.
         histories: What was done before, by channel; nothing by default.
         tables: What was shown, with the features of the tree.
+        changes: Whether to look for the least changes that lead to something else, which takes
+            most of the time.
 
     Raises:
         RuleError: The tree cannot be explained.
@@ -93,6 +97,7 @@ def explain(
             tuple(values),
             (histories or {}).get(channel, ActionHistory()),
             of_channel.get(channel),
+            changes,
         )
         for channel, tree in policies_of(learned).items()
     )
@@ -105,14 +110,17 @@ def _explained(
     values: tuple[float, ...],
     history: ActionHistory,
     table: DemonstrationTable | None,
+    changes: bool,
 ) -> Explanation:
     traced = trace(tree, learned.features, values, history)
     acting = commanding(traced, tree)
     action = acting.node if acting is not None and isinstance(acting.node, nodes.Action) else None
     grid = grid_of(learned, [tree])
-    done = sweep(tree, grid, Results.AT_ONCE, Ticks.FIRST)
-    shown = of_tree(learned, channel) if table is None else of_table(table)
-    flips = tuple(_flips(learned, grid, done, values, history, action, shown))
+    flips: tuple[Flip, ...] | None = None
+    if changes:
+        done = sweep(tree, grid, Results.AT_ONCE, Ticks.FIRST)
+        shown = of_tree(learned, channel) if table is None else of_table(table)
+        flips = tuple(_flips(learned, grid, done, values, history, action, shown))
     support = None
     if table is not None and acting is not None:
         support = _support(tree, table, acting.leaf)

@@ -42,7 +42,7 @@ def lines(learned: LearnedTree, values: Sequence[float], explained: Explanation)
         yield "  The least changes for something else:"
         for flip in explained.flips[:_CHANGES]:
             yield f"    {_changed(learned, values, flip)} → {action_text(flip.action)}"
-    else:
+    elif explained.flips is not None:
         yield "  Nothing else is ever commanded."
 
 

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from std_msgs.msg import Bool, Float64MultiArray, String
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps
@@ -26,6 +26,7 @@ from rebt_ros.demonstration.fields import values_of
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError, RebtError
 from rebt_ros.live.background import Background
+from rebt_ros.live.last_tick import LastTick, last_tick
 from rebt_ros.live.novelty_guard import NoveltyGuard
 from rebt_ros.live.takeover import Takeover, channel_of
 from rebt_ros.live.tree_inputs import Message
@@ -104,6 +105,7 @@ class ExecutorNode(Node):
         self._ticks = 0
         self._commands = 0
         self._slowest = 0.0
+        self._last_tick: LastTick | None = None
         self._watch = GraphWatch(self)
         self._trees = f"{settings.learner}/behavior_tree" if settings.learner else "behavior_tree"
         self._last_snapshot = ""
@@ -137,6 +139,7 @@ class ExecutorNode(Node):
             self._check_topics(program)
             self._install(program)
         self.create_service(SetBool, "~/enable", self._enable)
+        self.create_service(Trigger, "~/explain", self._explain)
         self._timer = self.create_timer(1.0 / self._settings.rate, self._tick, clock=self._time)
         self.create_timer(_SNAPSHOT_PERIOD, self._publish_snapshot, clock=steady)
         self.create_timer(_LOOK_PERIOD, self._look_at_publishers, clock=steady)
@@ -372,6 +375,18 @@ class ExecutorNode(Node):
         self.get_logger().info(response.message)
         return response
 
+    def _explain(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Says why the last tick did what it did."""
+        if self._last_tick is None:
+            response.message = f"there was no tick yet: {self._condition()}."
+            return response
+        try:
+            response.message = self._last_tick.explained()
+            response.success = True
+        except RebtError as err:
+            response.message = str(err)
+        return response
+
     def _forget_history(self) -> None:
         for history in self._histories.values():
             history.clear()
@@ -394,7 +409,9 @@ class ExecutorNode(Node):
         self._resting = False
         self._moving = True
         self._channels.begin_tick()
-        commands = program.runtime.tick(program.inputs.state()).commands
+        state = program.inputs.state()
+        self._last_tick = last_tick(program.learned, state, program.runtime.histories)
+        commands = program.runtime.tick(state).commands
         self._ticks += 1
         self._commands += self._channels.send(commands)
         self._slowest = max(self._slowest, time.perf_counter() - began)
