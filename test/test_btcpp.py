@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from random import Random
+from typing import Any
 
 import pytest
 import strategies as some
@@ -194,3 +197,46 @@ def test_a_wrong_mapping_is_noticed(tree: nodes.Node, right: str, wrong: str) ->
     assert not any(list(_differences(learned, seed)) for seed in range(10))
     broken = text.replace(right, wrong)
     assert any(list(_differences(learned, seed, text=broken)) for seed in range(10))
+
+
+def _factory(learned: LearnedTree, done: list[str]) -> Any:
+    import behaviortreepy
+
+    factory = behaviortreepy.BehaviorTreeFactory()
+    for action in nodes.actions(learned.tree):
+
+        def carry_out(node: Any, label: str = action.label) -> Any:
+            done.append(label)
+            return behaviortreepy.NodeStatus.SUCCESS
+
+        factory.register_simple_action(action.label, carry_out)
+    return factory
+
+
+def test_it_is_a_part_of_a_larger_tree_as_the_docs_say() -> None:
+    learned = some.learned(
+        nodes.Selector((some.when(AFTER_GO, then=TURN), some.when(NEAR, then=GO), WAIT))
+    )
+    done: list[str] = []
+    factory = _factory(learned, done)
+    factory.register_behavior_tree_from_text(to_btcpp(learned))
+    page = (Path(__file__).resolve().parents[1] / "docs/export.md").read_text(encoding="utf-8")
+    [part] = re.findall(r"`(<SubTree [^`]*)`", page)
+    factory.register_behavior_tree_from_text(
+        f'<root BTCPP_format="4"><BehaviorTree ID="Robot">{part}</BehaviorTree></root>'
+    )
+    tree = factory.create_tree("Robot")
+    tree.root_blackboard().set_double("distance", 0.1)
+    for _ in range(3):
+        tree.tick_exactly_once()
+    tree.root_blackboard().set_double("distance", 0.9)
+    tree.tick_exactly_once()
+    tree.tick_exactly_once()
+    assert done == ["go", "turn", "go", "turn", "wait"]
+
+
+def test_a_variable_that_was_never_set_stops_the_tree_with_its_name() -> None:
+    learned = some.learned(some.when(NEAR, then=GO))
+    tree = _factory(learned, []).create_tree_from_text(to_btcpp(learned))
+    with pytest.raises(RuntimeError, match="distance"):
+        tree.tick_exactly_once()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -127,6 +128,20 @@ def test_the_command_prints_a_tree_or_writes_it(
     assert capsys.readouterr().out == to_btcpp(learned)
     export.main([str(path), "--to", "btcpp", "--out", str(out)])
     assert out.read_text(encoding="utf-8") == to_btcpp(learned)
+
+
+def test_what_is_printed_is_the_same_tree_in_any_encoding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    learned = some.learned(some.action("grün"))
+    path = tmp_path / "tree.json"
+    path.write_text(document.dumps(learned), encoding="utf-8")
+    for encoding in ("ascii", "latin-1", "utf-8"):
+        printed = io.BytesIO()
+        monkeypatch.setattr("sys.stdout", io.TextIOWrapper(printed, encoding=encoding))
+        export.main([str(path)])
+        labels = [one.get("label") for one in ElementTree.fromstring(printed.getvalue()).iter()]
+        assert "grün" in labels
 
 
 def test_what_cannot_be_exported_is_one_sentence_and_an_exit_code(

@@ -93,7 +93,7 @@ def test_every_command_has_help_for_every_terminal(
     assert "usage" in done.stdout
 
 
-@pytest.mark.parametrize("command", ["learn", "replay", "show"])
+@pytest.mark.parametrize("command", ["export", "learn", "replay", "show"])
 def test_a_command_whose_output_is_closed_does_its_work(
     command: str, table: Path, tmp_path: Path
 ) -> None:
@@ -107,7 +107,7 @@ def test_a_command_whose_output_is_closed_does_its_work(
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
-@pytest.mark.parametrize("command", ["learn", "replay", "show"])
+@pytest.mark.parametrize("command", ["export", "learn", "replay", "show"])
 def test_a_command_whose_output_is_full_says_so(command: str, table: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert _run("learn", table, "--out", out).returncode == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from rebt_ros.commands.shell import parse, run
@@ -31,10 +32,17 @@ def main(arguments: list[str] | None = None) -> None:
 def _export(path: Path, language: str, out: Path | None) -> None:
     text = LANGUAGES[language](read_tree(path))
     if out is None:
-        print(text, end="")
+        print(_as_printed(text), end="")
         return
     write_text_atomically(out, text)
     print(f"Written to {out}.")
+
+
+def _as_printed(text: str) -> str:
+    """The XML with references instead of what the output cannot hold, whatever it is read as."""
+    if "utf" in (sys.stdout.encoding or "").lower():
+        return text
+    return text.encode("ascii", "xmlcharrefreplace").decode("ascii")
 
 
 if __name__ == "__main__":
