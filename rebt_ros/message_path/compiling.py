@@ -24,7 +24,7 @@ from rebt_ros.message_path.functions import (
     norm,
 )
 from rebt_ros.message_path.path import Comparison
-from rebt_ros.message_path.scan import Beams, range_at
+from rebt_ros.message_path.scan import SCAN_FIELDS, Beams, range_at
 from rebt_ros.message_path.steps import (
     Apply,
     Element,
@@ -66,6 +66,22 @@ def attribute_of(path: CheckedPath) -> str | None:
         return None
     reads = [step.attribute for step in path.steps if isinstance(step, Read)]
     return ".".join(reads) if len(reads) == len(path.steps) else None
+
+
+def wanted_of(path: CheckedPath) -> tuple[tuple[str, ...], ...]:
+    """The attributes of messages that a path reads, each with all that is in it."""
+    attributes: tuple[str, ...] = ()
+    for step in path.steps:
+        match step:
+            case Read(attribute=attribute):
+                attributes = (*attributes, attribute)
+            case Range() | Ranges():
+                return tuple((*attributes, one) for one in SCAN_FIELDS)
+            case NamedElement(attribute=attribute, names=names):
+                return (*attributes, attribute), (*attributes, names)
+            case _:
+                return (attributes,)
+    return (attributes,)
 
 
 def getter(path: CheckedPath) -> Getter:

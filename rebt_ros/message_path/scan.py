@@ -19,6 +19,10 @@ from rebt_ros.arrays import FloatArray
 _TOLERANCE: Final = 1e-3
 
 
+#: What is read of a LaserScan.
+SCAN_FIELDS: Final = ("angle_min", "angle_increment", "range_min", "range_max", "ranges")
+
+
 class Scan(Protocol):
     """What is read of a LaserScan."""
 
@@ -66,36 +70,34 @@ class Beams:
 
     def ranges(self, scan: Scan) -> FloatArray:
         """The ranges, NaN where one is missing; shape (beams,)."""
-        known = _known(scan)
-        chosen = self._chosen(scan, len(known))
-        missing = known[chosen] == math.inf
-        return np.where(missing, np.nan, np.minimum(known[chosen], _most(scan)))
+        return np.minimum(self._part(scan), _most(scan))
 
     def least(self, scan: Scan) -> float | None:
         """The smallest of the ranges; None where all are missing."""
-        known = _known(scan)
-        part = known[self._chosen(scan, len(known))]
-        smallest = float(part.min()) if part.size else math.inf
-        return None if smallest == math.inf else min(smallest, _most(scan))
+        part = self._part(scan)
+        # What is missing is passed over, unless all is.
+        smallest = float(np.fmin.reduce(part)) if part.size else math.nan
+        return min(smallest, _most(scan)) if smallest == smallest else None
 
     def largest(self, scan: Scan) -> float | None:
         """The largest of the ranges; None where all are missing."""
-        there = self._there(scan)
-        return min(float(there.max()), _most(scan)) if there.size else None
+        part = self._part(scan)
+        largest = float(np.fmax.reduce(part)) if part.size else math.nan
+        return min(largest, _most(scan)) if largest == largest else None
 
     def mean(self, scan: Scan) -> float | None:
         """The mean of the ranges; None where all are missing."""
-        there = self._there(scan)
+        part = self._part(scan)
+        there = part[part == part]
         if not there.size:
             return None
         return float(np.minimum(there, _most(scan)).mean(dtype=np.float64))
 
-    def _there(self, scan: Scan) -> FloatArray:
-        """The ranges that are not missing."""
+    def _part(self, scan: Scan) -> FloatArray:
+        """The ranges of the beams as they are in the message, NaN where they are missing."""
         known = _known(scan)
-        part = known[self._chosen(scan, len(known))]
-        there: FloatArray = part[part < math.inf]
-        return there
+        part: FloatArray = known[self._chosen(scan, len(known))]
+        return part
 
     def _between(self, scan: Scan, count: int) -> slice | NDArray[np.intp]:
         """The beams between two angles."""
@@ -106,21 +108,23 @@ class Beams:
         return self._beams
 
 
+_MISSING: Final = np.float32(math.nan)
+
 #: The scan that was read last, with its known ranges: several paths read one after the other.
 _latest: tuple[Scan | None, FloatArray] = (None, np.zeros(0))
 
 
 def _known(scan: Scan) -> FloatArray:
-    """All ranges; infinite ones are missing, and those beyond range_max finite."""
+    """All ranges, NaN where they are missing."""
     global _latest
     latest, known = _latest
     if latest is not scan:
         ranges = np.asarray(scan.ranges)
-        beyond = _most(scan)
-        # Neither is true of NaN.
-        known = np.where(ranges >= scan.range_min, ranges, np.float32(math.inf))
-        if beyond < math.inf:
-            known[ranges > beyond] = beyond
+        # Not true of NaN.
+        there = ranges >= scan.range_min
+        if _most(scan) == math.inf:
+            there &= ranges < math.inf
+        known = np.where(there, ranges, _MISSING)
         _latest = (scan, known)
     return known
 

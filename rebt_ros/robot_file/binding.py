@@ -8,6 +8,7 @@ from typing import Final
 
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.message_path.checking import CheckedPath, check
+from rebt_ros.message_path.compiling import wanted_of
 from rebt_ros.message_path.definition import Definitions, Primitive
 from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.robot_file.errors import RobotFileError
@@ -43,6 +44,18 @@ class BoundTopic:
     """What makes labels of its messages, by channel."""
     has_stamp: bool
     """Whether the stamp in its header says when a message is from."""
+
+    @property
+    def wanted(self) -> frozenset[tuple[str, ...]]:
+        """The attributes of messages that are read, each with all that is in it."""
+        return frozenset(
+            wanted
+            for found in (
+                *(wanted_of(one.path) for one in self.features),
+                *(one.wanted for one in self.labellers.values()),
+            )
+            for wanted in found
+        )
 
 
 def bind(robot: RobotFile, topic: str, kind: str, definitions: Definitions) -> BoundTopic:

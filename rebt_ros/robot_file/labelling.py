@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, TypeAlias
 
 from rebt_ros.message_path.checking import check
-from rebt_ros.message_path.compiling import Value, getter
+from rebt_ros.message_path.compiling import Value, getter, wanted_of
 from rebt_ros.message_path.definition import Definitions, Primitive
 from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.robot_file.robot_file import (
@@ -26,8 +26,15 @@ _STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 _LOG: Final = "nav2_msgs/msg/BehaviorTreeLog"
 
 
+#: Attributes that lead to a value, or to a message with all that is in it.
+Attributes: TypeAlias = tuple[str, ...]
+
+
 class Labeller(Protocol):
     """Makes labels of messages that come one after the other."""
+
+    wanted: tuple[Attributes, ...]
+    """The attributes of messages that are read, each with all that is in it."""
 
     def labels(self, message: Any, stamp: int) -> Sequence[str]:
         """What a message says that is done from now on; empty labels for nothing any longer.
@@ -96,6 +103,7 @@ class PathLabeller:
                 f"message path {str(source.path)!r} gives a number with decimals, of which no "
                 "label can be made: choose a string, an integer or a bool."
             )
+        self.wanted = wanted_of(path)
         self._get = getter(path)
         self._labels = source.labels
         self._text = _written(path.kind, path.names)
@@ -133,6 +141,7 @@ class JoyLabeller:
     """
 
     def __init__(self, source: JoyActions) -> None:
+        self.wanted: tuple[Attributes, ...] = (("buttons",), ("axes",))
         self._source = source
         self._down: set[int] = set()
         self._held = ""
@@ -180,6 +189,8 @@ class TwistLabeller:
     """
 
     def __init__(self, source: TwistActions, *, stamped: bool) -> None:
+        lead = ("twist",) if stamped else ()
+        self.wanted: tuple[Attributes, ...] = (*lead, "linear", "x"), (*lead, "angular", "z")
         self._source = source
         self._stamped = stamped
         self._now = ""
@@ -223,6 +234,7 @@ class LogLabeller:
     """
 
     def __init__(self, source: BehaviorTreeLogActions) -> None:
+        self.wanted: tuple[Attributes, ...] = (("event_log",),)
         self._labels = source.labels
         self._running: dict[str, str] = {}
         self._changes = _Changes(Emit.CHANGE)

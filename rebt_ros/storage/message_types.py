@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, Final
 
 from rosbags.interfaces import Nodetype
@@ -11,6 +11,7 @@ from rosbags.typesys.base import normalize_fieldname
 
 from rebt_ros.message_path.definition import FILLER, Field, MessageType, Primitive
 from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.storage.partial_messages import Attributes, PartialDecoder
 
 #: Bytes before the values of a message, and what tells their order.
 _HEAD: Final = 4
@@ -69,6 +70,18 @@ class BagTypes:
         if end + _HEAD + _MOST_PADDING < len(data):
             raise ValueError("it is longer than its type")
         return message
+
+    def decoder(self, name: str, wanted: Collection[Attributes]) -> Callable[[bytes], object]:
+        """What decodes messages of a type that is known, at least as far as attributes are wanted.
+
+        Args:
+            name: The type.
+            wanted: Attributes that lead to values, or to messages with all that is in them.
+        """
+        try:
+            return PartialDecoder(name, wanted, self._store.fielddefs).decode
+        except NotImplementedError:
+            return lambda data: self.decode(data, name)
 
     def _definition(self, name: str) -> MessageType:
         if name not in self._store.fielddefs:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
@@ -82,9 +82,10 @@ def read_robot_bag(
             list(robot.actions),
             sample_rate,
         )
+        decoders = {topic: types.decoder(topic[1], one.wanted) for topic, one in wanted.items()}
         there = {topic[0]: bag.found[topic] for topic, one in wanted.items() if one.features}
         feed = _RobotFeed(
-            path, builder, skip_bad, there, types=types, topics=wanted, readers=readers
+            path, builder, skip_bad, there, decoders=decoders, topics=wanted, readers=readers
         )
         messages = _in_order(path, bag, wanted)
         rows = (row for message in messages for row in feed.rows_of(*message))
@@ -109,7 +110,7 @@ def read_robot_bag(
 class _RobotFeed(Feed):
     """Reads messages of any type."""
 
-    types: BagTypes
+    decoders: dict[Topic, Callable[[bytes], object]]
     topics: dict[Topic, BoundTopic]
     readers: dict[str, FeatureReader] = field(default_factory=dict)
 
@@ -119,7 +120,7 @@ class _RobotFeed(Feed):
             raise LateError
         bound, data = self.topics[topic], unpacked(data)
         try:
-            message = self.types.decode(data, bound.kind)
+            message = self.decoders[topic](data)
         except Exception as err:  # whatever the generated decoders meet
             raise UndecodableError from err
         rows: list[Row] = []
