@@ -11,7 +11,7 @@ import numpy as np
 from rebt_ros.arrays import BoolArray, FloatArray
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.shown import ShownChannel, Span
-from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.schema import Feature, Source, codes_of, sources
 
 #: Rounding of single precision, in which sensors often measure, is no departure.
 _ROUNDING = 1e-6
@@ -68,9 +68,11 @@ class NoveltyDetector:
         margin: float,
     ) -> None:
         self._columns = tuple(
-            _Column(place, feature, default_topic, coded=learned.robot is not None)
-            for place, feature in enumerate(learned.features)
-            if not feature.lag and (feature.topic or default_topic) in topics
+            _Column(place, feature, source, coded=learned.robot is not None)
+            for place, (feature, source) in enumerate(
+                zip(learned.features, sources(learned.features, default_topic), strict=True)
+            )
+            if not feature.lag and source.topic in topics
         )
         # A tree that reads nothing has nothing to compare.
         shown = learned.shown if self._columns else ()
@@ -100,38 +102,25 @@ class _Column:
     Args:
         place: Its place among the features of the tree.
         feature: The feature.
-        default_topic: Its topic where it names none.
+        source: Where messages carry it.
         coded: Whether messages hold positions of categories, not their numbers.
     """
 
-    def __init__(self, place: int, feature: Feature, default_topic: str, *, coded: bool) -> None:
+    def __init__(self, place: int, feature: Feature, source: Source, *, coded: bool) -> None:
         self.place = place
         self.name = feature.name
         self.categories = feature.categories
-        self._topic = feature.topic or default_topic
-        self._index = place if feature.index is None else feature.index
-        self._codes = {
-            number: code
-            for code, name in enumerate(feature.categories)
-            if (number := float(code) if coded else _number(name)) is not None
-        }
+        self._source = source
+        self._codes = codes_of(feature, coded=coded)
 
     def value(self, latest: Mapping[str, Sequence[float]]) -> float:
         """NaN where it is not known."""
-        values = latest.get(self._topic, ())
-        return float(values[self._index]) if self._index < len(values) else math.nan
+        values, index = latest.get(self._source.topic, ()), self._source.index
+        return float(values[index]) if index < len(values) else math.nan
 
     def code(self, value: float) -> int:
         """Of a category: its place, or the number of all of them where it is none of them."""
         return self._codes.get(value, len(self.categories))
-
-
-def _number(category: str) -> float | None:
-    """What a category is on a topic; None of one that is a word in a table."""
-    try:
-        return float(category)
-    except ValueError:
-        return None
 
 
 class _Ranges:

@@ -17,21 +17,15 @@ import numpy.typing as npt
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.condition_tests import StateTests, holds_after
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import (
     Condition,
-    Difference,
-    HasCategory,
     HistoryCondition,
-    Interval,
-    IsTrue,
     LastActionIs,
     Literal,
     PreviousActionIs,
-    Quantity,
-    StateCondition,
-    Threshold,
 )
 
 #: Tells in which of the states a condition on the history holds, or for all of them at once.
@@ -52,15 +46,6 @@ def history_columns(labels: tuple[str, ...], previous: IntArray, last: IntArray)
 def as_it_stands(history: ActionHistory) -> HistoryTest:
     """The history as an executed tree reads it; of LAT, by the rule that asks."""
     return partial(holds_after, history)
-
-
-def holds_after(history: ActionHistory, condition: HistoryCondition) -> bool:
-    """Whether a condition holds after what was done."""
-    match condition:
-        case PreviousActionIs(action=action):
-            return history.previous == action
-        case LastActionIs(action=action, deciding=deciding):
-            return history.before(*deciding) == action
 
 
 #: Rows that are evaluated at a time: so many that what Python does once per node does not matter,
@@ -95,42 +80,8 @@ class States:
         if isinstance(condition, PreviousActionIs | LastActionIs):
             holds = np.broadcast_to(self.history(condition), len(self))
         else:
-            holds = _test(condition, self._column, self._feature)
+            holds = StateTests(self.features).of(condition)(self.values.T)
         return holds if literal.positive else ~holds
-
-    def _column(self, name: str) -> FloatArray:
-        return self.values[:, self.place(name)]
-
-    def _feature(self, name: str) -> Feature:
-        return self.features[self.place(name)]
-
-    def place(self, feature: str) -> int:
-        """The column of a feature."""
-        return next(index for index, one in enumerate(self.features) if one.name == feature)
-
-
-def _test(
-    condition: StateCondition,
-    column: Callable[[str], FloatArray],
-    feature: Callable[[str], Feature],
-) -> BoolArray:
-    """Where a condition holds, given what the features hold and what they are."""
-    match condition:
-        case Threshold(quantity=quantity, value=value):
-            return np.less_equal(_values(quantity, column), value)
-        case Interval(quantity=quantity, above=above, at_most=at_most):
-            values = _values(quantity, column)
-            return np.less(above, values) & np.less_equal(values, at_most)
-        case IsTrue(feature=name):
-            return np.equal(column(name), 1)
-        case HasCategory(feature=name, category=category):
-            return np.equal(column(name), feature(name).categories.index(category))
-
-
-def _values(quantity: Quantity, column: Callable[[str], FloatArray]) -> FloatArray:
-    if isinstance(quantity, Difference):
-        return np.subtract(column(quantity.minuend), column(quantity.subtrahend))
-    return column(quantity)
 
 
 def triggered(tree: nodes.Node, states: States) -> dict[nodes.Action, BoolArray]:
@@ -186,8 +137,12 @@ class Plan:
         by_name = {feature.name: number for number, feature in reversed([*enumerate(features)])}
         read = {by_name[name] for name in nodes.features(tree)}
         self._columns = tuple(sorted(read))
-        self._row = {features[column].name: row for row, column in enumerate(self._columns)}
-        self._features = features
+        tests = StateTests([features[column] for column in self._columns])
+        self._tests = {
+            number: tests.of(condition)
+            for number, condition in enumerate(self._conditions)
+            if not isinstance(condition, PreviousActionIs | LastActionIs)
+        }
 
     def choose(self, actions: tuple[nodes.Action, ...], states: States) -> IntArray:
         """As the function of this name."""
@@ -242,19 +197,11 @@ class Plan:
         number: int,
     ) -> _Mask:
         """Where a condition holds in a part of the rows."""
-        condition, count = self._conditions[number], rows.stop - rows.start
-        if isinstance(condition, PreviousActionIs | LastActionIs):
-            found = before[number]
-            where = found[rows] if isinstance(found, np.ndarray) else np.full(count, found)
-            return _packed(where)
-
-        def column(name: str) -> FloatArray:
-            return columns[self._row[name], :count]
-
-        return _packed(_test(condition, column, self._feature))
-
-    def _feature(self, name: str) -> Feature:
-        return self._features[self._columns[self._row[name]]]
+        count = rows.stop - rows.start
+        if number in self._tests:
+            return _packed(self._tests[number](columns[:, :count]))
+        found = before[number]
+        return _packed(found[rows] if isinstance(found, np.ndarray) else np.full(count, found))
 
 
 class _Part:

@@ -10,30 +10,22 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple, Protocol
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import py_trees
 from py_trees.common import Status
 
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.condition_tests import StateTests, history_test
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.prediction import holds_after
 from rebt_ros.behavior_tree.wording import Wording
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import ActionHistory
-from rebt_ros.demonstration.schema import Feature, FeatureKind, number_of
-from rebt_ros.logic.conditions import (
-    Condition,
-    Difference,
-    HasCategory,
-    Interval,
-    IsTrue,
-    LastActionIs,
-    PreviousActionIs,
-    Quantity,
-    Threshold,
-)
+from rebt_ros.demonstration.schema import Feature, FeatureKind, codes_of, sources
+from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
+
+#: What a condition is about.
+_Read = TypeVar("_Read")
 
 
 class Commander(Protocol):
@@ -123,12 +115,13 @@ class TreeRuntime:
         self.histories.update(histories or {})
         self._commander = SucceedAtOnce() if commander is None else commander
         self._carry_out = carry_out
-        self._state: Sequence[float] = ()
+        # Always the same list, which conditions hold on to.
+        self._state: list[float] = []
         self._ticked: list[_Ticked] = []
         # Of trees that were learned from events, what runs on each channel.
         self._running: dict[str, str] = {}
         self._wording = Wording(learned)
-        self._place = {feature.name: place for place, feature in enumerate(learned.features)}
+        self._tests = StateTests(learned.features)
         tree = learned.tree if tree is None else tree
         # Actions are built in the order of `walk`.
         self._ranks = iter(nodes.precedence(tree))
@@ -152,7 +145,7 @@ class TreeRuntime:
 
     def begin(self, state: Sequence[float]) -> None:
         """Begins a tick of `root` that something else does, as a tree that it is a part of."""
-        self._state = state
+        self._state[:] = state
         self._ticked.clear()
 
     def finish(self) -> Sequence[_Ticked]:
@@ -252,8 +245,7 @@ class TreeRuntime:
     ) -> py_trees.behaviour.Behaviour:
         match node:
             case nodes.Condition(literal=literal):
-                holds = self._test_condition(literal.condition, history)
-                return _Test(name, holds, positive=literal.positive)
+                return self._test(name, literal, history)
             case nodes.Action():
                 rank = next(self._ranks)
                 if self._carry_out is not None:
@@ -273,35 +265,11 @@ class TreeRuntime:
                 sequence = py_trees.composites.Sequence(name, True, children)
                 return py_trees.decorators.Repeat(name=name, child=sequence, num_success=-1)
 
-    def _test_condition(self, condition: Condition, history: ActionHistory) -> Callable[[], bool]:
-        match condition:
-            case PreviousActionIs() | LastActionIs():
-                return partial(holds_after, history, condition)
-            case Threshold(quantity=str(name), value=value):
-                # Most conditions are of this kind, and ticked very often: no call in between.
-                place = self._place[name]
-                return lambda: self._state[place] <= value
-            case Threshold(quantity=quantity, value=value):
-                read = self._reading(quantity)
-                return lambda: read() <= value
-            case Interval(quantity=quantity, above=above, at_most=at_most):
-                read = self._reading(quantity)
-                return lambda: above < read() <= at_most
-            case IsTrue(feature=name):
-                place = self._place[name]
-                return lambda: self._state[place] == 1
-            case HasCategory(feature=name, category=category):
-                place = self._place[name]
-                code = self.learned.features[place].categories.index(category)
-                return lambda: self._state[place] == code
-
-    def _reading(self, quantity: Quantity) -> Callable[[], float]:
-        """What reads a quantity from the state."""
-        if isinstance(quantity, Difference):
-            minuend, subtrahend = self._place[quantity.minuend], self._place[quantity.subtrahend]
-            return lambda: self._state[minuend] - self._state[subtrahend]
-        place = self._place[quantity]
-        return lambda: self._state[place]
+    def _test(self, name: str, literal: Literal, history: ActionHistory) -> _Leaf:
+        condition = literal.condition
+        if isinstance(condition, PreviousActionIs | LastActionIs):
+            return _Test(name, history_test(condition), history, positive=literal.positive)
+        return _Test(name, self._tests.of(condition), self._state, positive=literal.positive)
 
 
 def _parallel(
@@ -328,17 +296,27 @@ class _Leaf(py_trees.behaviour.Behaviour):
         self.status = new_status
 
 
-class _Test(_Leaf):
-    """A condition, or its negation: succeeds or fails at once."""
+class _Test(_Leaf, Generic[_Read]):
+    """A condition, or its negation: succeeds or fails at once.
 
-    def __init__(self, name: str, holds: Callable[[], bool], *, positive: bool) -> None:
+    Args:
+        name: Its words.
+        holds: Whether the condition holds.
+        read: What it is about: the state or a history, as it is when the condition is ticked.
+        positive: False for the negation.
+    """
+
+    def __init__(
+        self, name: str, holds: Callable[[_Read], bool], read: _Read, *, positive: bool
+    ) -> None:
         super().__init__(name)
         self._holds = holds
+        self._read = read
         both = (Status.SUCCESS, Status.FAILURE)
         self._if_true, self._if_false = both if positive else reversed(both)
 
     def update(self) -> Status:
-        return self._if_true if self._holds() else self._if_false
+        return self._if_true if self._holds(self._read) else self._if_false
 
 
 class _Ticked(NamedTuple):
@@ -428,29 +406,18 @@ class StateEncoder:
     def __init__(
         self, features: Sequence[Feature], default_topic: str = "state", *, coded: bool = False
     ) -> None:
-        self._sources = [
-            (
-                feature,
-                feature.topic or default_topic,
-                place if feature.index is None else feature.index,
-            )
+        self._lags = [feature.lag for feature in features]
+        self._sources = sources(features, default_topic)
+        self._codes = {
+            place: {number: float(code) for number, code in codes_of(feature, coded=coded).items()}
             for place, feature in enumerate(features)
-        ]
-        self._codes = [
-            {
-                number: float(code)
-                for code, name in enumerate(feature.categories)
-                if (number := float(code) if coded else number_of(name)) is not None
-            }
-            for feature in features
-        ]
-        self._past: deque[list[float]] = deque(
-            maxlen=max((feature.lag for feature in features), default=0)
-        )
+            if feature.kind is FeatureKind.CATEGORICAL
+        }
+        self._past: deque[list[float]] = deque(maxlen=max(self._lags, default=0))
         self.topics: dict[str, int] = {}
         """The least number of values that each topic must send."""
-        for _, topic, index in self._sources:
-            self.topics[topic] = max(self.topics.get(topic, 0), index + 1)
+        for one in self._sources:
+            self.topics[one.topic] = max(self.topics.get(one.topic, 0), one.index + 1)
 
     def encode(self, latest: Mapping[str, Sequence[float]]) -> list[float]:
         """The values of all features; NaN for a category that was never shown.
@@ -462,14 +429,10 @@ class StateEncoder:
             latest: The newest message of every topic in `topics`, of at least that length.
         """
         # Of a lagged feature, what its source holds now.
-        present = [latest[topic][index] for _, topic, index in self._sources]
-        for place, (feature, _, _) in enumerate(self._sources):
-            if feature.kind is FeatureKind.CATEGORICAL:
-                present[place] = self._codes[place].get(present[place], math.nan)
-        state = [
-            self._at(feature.lag, place, present)
-            for place, (feature, _, _) in enumerate(self._sources)
-        ]
+        present = [latest[one.topic][one.index] for one in self._sources]
+        for place, codes in self._codes.items():
+            present[place] = codes.get(present[place], math.nan)
+        state = [self._at(lag, place, present) for place, lag in enumerate(self._lags)]
         self._past.appendleft(present)
         return state
 

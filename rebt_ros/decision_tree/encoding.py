@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rebt_ros.arrays import Float32Array, FloatArray, IntArray
+from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -120,8 +121,9 @@ def encode(
             matrix[:, start] = values == 1
         else:
             _one_hot(values, matrix[:, start:end])
+    tests = StateTests(table.features)
     for place, difference in enumerate(vocabulary.differences, start=end):
-        _number(difference_of(table, difference, states), matrix[:, place])
+        _number(tests.reading(difference)(states.T), matrix[:, place])
     if history is not None:
         encode_history(matrix, history[rows], len(table.actions))
     return whole
@@ -141,15 +143,6 @@ def history_of(table: DemonstrationTable, vocabulary: Vocabulary) -> IntArray | 
 def encode_history(matrix: Float32Array, history: IntArray, actions: int) -> None:
     """Writes a history to a matrix that has one: positions of actions, shape (rows,)."""
     _one_hot(history, matrix[:, matrix.shape[1] - actions :])
-
-
-def difference_of(
-    table: DemonstrationTable, difference: Difference, states: FloatArray
-) -> FloatArray:
-    """The values of a difference in some of the table's states, shape (rows,)."""
-    place = {feature.name: index for index, feature in enumerate(table.features)}
-    minuend, subtrahend = place[difference.minuend], place[difference.subtrahend]
-    return np.asarray(states[:, minuend] - states[:, subtrahend])
 
 
 def exact_threshold(threshold: float) -> float:

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.behavior_tree.nodes import Action
+from rebt_ros.behavior_tree.prediction import history_columns
 from rebt_ros.decision_tree.encoding import (
     Indicator,
     Number,
     Vocabulary,
     columns,
-    difference_of,
     encode,
 )
 from rebt_ros.decision_tree.grown import GrownTree
@@ -23,9 +24,6 @@ from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import (
     KNOWN,
-    Difference,
-    HasCategory,
-    IsTrue,
     LastActionIs,
     Literal,
     PreviousActionIs,
@@ -263,7 +261,7 @@ class _Values:
         self._columns = {}
         for place, asked in enumerate(columns(table, vocabulary)):
             if place in grown.column:
-                values = _asked(asked, table, vocabulary)
+                values = _asked(asked, table)
                 self._columns[place] = np.where(np.isnan(values), np.inf, values)
 
     def of(self, rows: IntArray, column: IntArray) -> FloatArray:
@@ -275,26 +273,15 @@ class _Values:
         return values
 
 
-def _asked(
-    asked: Number | Indicator, table: DemonstrationTable, vocabulary: Vocabulary
-) -> FloatArray:
-    place = {feature.name: index for index, feature in enumerate(table.features)}
-    match asked:
-        case Number(quantity=Difference() as difference):
-            return difference_of(table, difference, table.states)
-        case Number(quantity=str(name)):
-            return table.states[:, place[name]]
-        case Indicator(condition=IsTrue(feature=name)):
-            holds = table.states[:, place[name]] == 1
-        case Indicator(condition=HasCategory(feature=name, category=category)):
-            code = table.features[place[name]].categories.index(category)
-            holds = table.states[:, place[name]] == code
-        case Indicator(condition=PreviousActionIs(action=action)):
-            holds = table.previous == table.actions.index(action)
-        case Indicator(condition=LastActionIs(action=action)):
-            holds = table.last == table.actions.index(action)
-        case _:
-            raise AssertionError(asked)
+def _asked(asked: Number | Indicator, table: DemonstrationTable) -> FloatArray:
+    """What a column asks of each row, in double precision: a number, or 1 for yes; (rows,)."""
+    if isinstance(asked, Number):
+        return StateTests(table.features).reading(asked.quantity)(table.states.T)
+    condition = asked.condition
+    if isinstance(condition, PreviousActionIs | LastActionIs):
+        holds = history_columns(table.actions, table.previous, table.last)(condition)
+    else:
+        holds = StateTests(table.features).of(condition)(table.states.T)
     return np.asarray(holds, dtype=np.float64)
 
 

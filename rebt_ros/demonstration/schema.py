@@ -14,6 +14,7 @@ A lagged feature is the value that another one, its source, had some rows before
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -74,6 +75,42 @@ class Feature:
             raise ValueError(f"{self.name!r} needs both a topic and an index, or neither")
         if self.topic is not None and self.index is None:
             raise ValueError(f"{self.name!r} has a topic without an index")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where messages carry the value of a feature; of a lagged one, what it looks back at."""
+
+    topic: str
+    index: int
+    """Position in the topic's array."""
+
+
+def sources(features: Sequence[Feature], default_topic: str) -> tuple[Source, ...]:
+    """Where messages carry each feature of a tree.
+
+    Args:
+        features: All features of the tree.
+        default_topic: Topic of features that came from a table, in their order there.
+    """
+    return tuple(
+        Source(feature.topic or default_topic, place if feature.index is None else feature.index)
+        for place, feature in enumerate(features)
+    )
+
+
+def codes_of(feature: Feature, *, coded: bool = False) -> dict[float, int]:
+    """The place of each category, by the number that messages carry for it.
+
+    Args:
+        feature: Any; one that is not categorical has none.
+        coded: Whether messages hold the places themselves.
+    """
+    return {
+        number: code
+        for code, name in enumerate(feature.categories)
+        if (number := float(code) if coded else number_of(name)) is not None
+    }
 
 
 def number_of(category: str) -> float | None:

@@ -15,8 +15,9 @@ import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.condition_tests import holds_after
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.prediction import Plan, States, holds_after
+from rebt_ros.behavior_tree.prediction import Plan, States
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import InputError

@@ -11,6 +11,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import StateEncoder
 from rebt_ros.demonstration.builder import BadMessageError, Fault
+from rebt_ros.demonstration.schema import sources
 from rebt_ros.robot_file.robot_file import RobotFile
 
 
@@ -36,12 +37,10 @@ class TreeInputs:
     def __init__(self, learned: LearnedTree, default_topic: str, timeout: int) -> None:
         tested = nodes.features(learned.tree)
         self._read = {
-            place: replace(
-                feature,
-                topic=feature.topic or default_topic,
-                index=place if feature.index is None else feature.index,
+            place: replace(feature, topic=source.topic, index=source.index)
+            for place, (feature, source) in enumerate(
+                zip(learned.features, sources(learned.features, default_topic), strict=True)
             )
-            for place, feature in enumerate(learned.features)
             if feature.name in tested
         }
         robot = learned.robot

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import permutations
 from typing import Final, TypeAlias
@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rebt_ros.arrays import BoolArray, FloatArray
-from rebt_ros.behavior_tree.prediction import holds_after
+from rebt_ros.behavior_tree.condition_tests import StateTests, holds_after
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import (
@@ -58,6 +58,9 @@ _BITS: Final = 64
 _MOST_HISTORIES: Final = 100_000
 #: Most boxes of the condition of a rule.
 _MOST_BOXES: Final = 5_000
+
+#: Stands for whatever a threshold or an interval compares.
+_QUANTITY: Final = Feature("quantity")
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,15 +208,12 @@ class Grid:
 
     def _holds(self, condition: StateCondition, ends: FloatArray) -> BoolArray:
         match condition:
-            case Threshold(quantity=quantity, value=value):
-                return np.less_equal(_signed(quantity, ends), value)
-            case Interval(quantity=quantity, above=above, at_most=at_most):
-                values = _signed(quantity, ends)
-                return np.less(above, values) & np.less_equal(values, at_most)
-            case IsTrue():
-                return np.equal(ends, 1)
-            case HasCategory(feature=name, category=category):
-                return np.equal(ends, self._by_name[name].categories.index(category))
+            case Threshold(quantity=quantity) | Interval(quantity=quantity):
+                # A difference stands in the grid as one value.
+                about_it = replace(condition, quantity=_QUANTITY.name)
+                return StateTests((_QUANTITY,)).of(about_it)(_signed(quantity, ends)[np.newaxis])
+            case IsTrue(feature=name) | HasCategory(feature=name):
+                return StateTests((self._by_name[name],)).of(condition)(ends[np.newaxis])
 
     def boxes(self, formula: Formula) -> Boxes:
         """Boxes that share out where a formula holds; they may overlap.

@@ -11,8 +11,9 @@ import numpy as np
 
 from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.condition_tests import holds_after
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.prediction import States, choose, history_columns, holds_after
+from rebt_ros.behavior_tree.prediction import States, choose, history_columns
 from rebt_ros.behavior_tree.runtime import AlwaysRunning, SucceedAtOnce, TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable

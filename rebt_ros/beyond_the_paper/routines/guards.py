@@ -15,8 +15,17 @@ from typing import TypeAlias
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray
+from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.logic.conditions import Condition, HasCategory, IsTrue, Literal, Threshold
+from rebt_ros.logic.conditions import (
+    Condition,
+    HasCategory,
+    IsTrue,
+    LastActionIs,
+    Literal,
+    PreviousActionIs,
+    Threshold,
+)
 
 Clause: TypeAlias = tuple[Literal, ...]
 Guard: TypeAlias = tuple[Clause, ...]
@@ -103,22 +112,15 @@ def holds(guard: Guard, states: FloatArray, features: Sequence[Feature]) -> Bool
     Returns:
         Shape (states,).
     """
-    column = {feature.name: number for number, feature in enumerate(features)}
+    tests = StateTests(features)
     result = np.ones(len(states), dtype=bool)
     for clause in guard:
         fulfilled = np.zeros(len(states), dtype=bool)
         for literal in clause:
-            match literal.condition:
-                case Threshold(str(name), value):
-                    true = states[:, column[name]] <= value
-                case IsTrue(name):
-                    true = states[:, column[name]] == 1
-                case HasCategory(name, category):
-                    place = features[column[name]].categories.index(category)
-                    true = states[:, column[name]] == place
-                case other:
-                    raise ValueError(f"a guard has no condition such as {other}")
-            fulfilled |= true == literal.positive
+            condition = literal.condition
+            if isinstance(condition, PreviousActionIs | LastActionIs):
+                raise ValueError(f"a guard has no condition such as {condition}")
+            fulfilled |= tests.of(condition)(states.T) == literal.positive
         result &= fulfilled
     return result
 
