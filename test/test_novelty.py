@@ -52,6 +52,14 @@ def _departure(
     return detector.departure({"state": state, **others})
 
 
+@pytest.mark.parametrize(("value", "shown"), [(1.0, True), (0.0, False)])
+def test_a_truth_value_on_a_topic_is_the_category_of_that_name(value: float, shown: bool) -> None:
+    feature = Feature("docked", FeatureKind.CATEGORICAL, ("False", "True"), topic="state", index=0)
+    learned = _learned(ShownLeaf(5, (("True",),)), features=(feature,))
+    detector = NoveltyDetector(learned, ["state"], "table", 0.0)
+    assert (detector.departure({"state": (value,)}) is None) is shown
+
+
 @pytest.mark.parametrize(
     "state",
     [(0.0, 5.0, 3.0), (1.0, 5.0, 3.0), (3.5, 5.5, 7.0), (np.float32(1.0), 5.0, 3.0)],
