@@ -57,9 +57,24 @@ def noisy(rows: int = 400) -> DemonstrationTable:
 # --- the level ----------------------------------------------------------------------------------
 
 
-def judged(hits: list[list[list[int]]], shown: list[list[int]]) -> JudgedLevels:
-    """Levels by the rows of each action that each one hits in each fold."""
-    return JudgedLevels(np.arange(len(hits[0]), dtype=float), np.array(hits), np.array(shown))
+def judged(
+    hits: list[list[list[int]]],
+    shown: list[list[int]],
+    leaves: list[int] | None = None,
+    explanations: list[int] | None = None,
+) -> JudgedLevels:
+    """Levels by the rows of each action that each one hits in each fold.
+
+    Unless said otherwise, all are equally simple: each leaf that is pruned makes an exception.
+    """
+    levels = len(hits[0])
+    return JudgedLevels(
+        np.arange(levels, dtype=float),
+        np.array(hits),
+        np.array(shown),
+        np.array(leaves or range(levels, 0, -1)),
+        np.array(explanations or [levels] * levels),
+    )
 
 
 def test_a_rare_action_counts_as_much_as_a_frequent_one() -> None:
@@ -106,6 +121,33 @@ def test_of_trees_that_folds_disagree_about_the_largest_is_chosen() -> None:
     assert levels.chosen == 0
 
 
+#: Two folds that disagree about which of three levels is the best.
+_DISAGREEING = [[[6, 6], [8, 8], [7, 7]], [[8, 8], [7, 7], [6, 6]]]
+
+
+def test_of_trees_that_folds_disagree_about_one_that_is_clearly_simpler_is_chosen() -> None:
+    levels = judged(_DISAGREEING, [[150, 150]] * 2, [30, 4, 3], [30, 15, 15])
+    assert levels.best == levels.chosen == 1
+    assert levels.largest == 0
+
+
+@pytest.mark.parametrize("explanations", [[30, 24, 24], [15, 15, 15], [15, 40, 40]])
+def test_a_tree_that_is_not_clearly_simpler_is_none_to_prune_for(explanations: list[int]) -> None:
+    levels = judged(_DISAGREEING, [[150, 150]] * 2, [30, 4, 3], explanations)
+    assert levels.chosen == levels.largest == 0
+
+
+def test_how_simple_a_tree_is_tells_nothing_where_its_leaves_have_few_rows() -> None:
+    levels = judged(_DISAGREEING, [[10, 9]] * 2, [30, 4, 3], [30, 15, 15])
+    assert levels.chosen == levels.largest == 0
+
+
+def test_a_clearly_worse_tree_is_not_chosen_for_being_simpler() -> None:
+    fold = [[9, 9], [6, 6]]
+    levels = judged([fold, fold], [[150, 150]] * 2, [30, 4], [30, 15])
+    assert levels.chosen == levels.largest == 0
+
+
 counts = st.integers(0, 20)
 
 
@@ -119,12 +161,14 @@ def test_no_tree_smaller_than_the_best_is_chosen_and_none_that_every_fold_speaks
             st.lists(counts, min_size=folds * levels * 3, max_size=folds * levels * 3), label="hits"
         )
     ).reshape(folds, levels, 3)
-    result = JudgedLevels(np.arange(levels, dtype=float), hits, shown)
+    sizes = st.lists(counts.map(lambda count: 1 + count), min_size=levels, max_size=levels)
+    leaves, explanations = (np.array(data.draw(sizes)) for _ in range(2))
+    result = JudgedLevels(np.arange(levels, dtype=float), hits, shown, leaves, explanations)
     recalls = (hits / 20).mean(axis=(0, 2))
     assert result.mean_recalls == pytest.approx(recalls)
     assert recalls[result.best] == pytest.approx(recalls.max())
     assert not (recalls[: result.best] > recalls.max() - 1e-9).any()
-    assert result.chosen <= result.best
+    assert result.largest <= result.chosen <= result.best
     sums = hits.sum(axis=2)
     apart = sums[:, result.best] - sums[:, result.chosen]
     assert result.chosen == result.best or apart.min() < apart.max()
@@ -136,8 +180,8 @@ def test_a_recall_is_clearly_raised_where_the_better_level_would_be_chosen(
 ) -> None:
     drawn = data.draw(st.lists(counts, min_size=folds * 4, max_size=folds * 4), label="hits")
     hits, shown = np.array(drawn).reshape(folds, 2, 2), np.full((folds, 2), 20)
-    both = JudgedLevels(np.arange(2.0), hits, shown)
-    before, after = (JudgedLevels(np.zeros(1), hits[:, [place]], shown) for place in range(2))
+    both = judged(hits.tolist(), shown.tolist())
+    before, after = (judged(hits[:, [place]].tolist(), shown.tolist()) for place in range(2))
     assert clearly_raised(before, after) is (both.chosen == 1)
     assert not (clearly_raised(before, after) and clearly_raised(after, before))
     assert not clearly_raised(before, before)
@@ -204,6 +248,28 @@ def test_noise_is_pruned_away() -> None:
     tree = policy.fitted.at(policy.ccp_alpha).tree
     assert sum(1 for _ in tree.paths()) <= 4
     assert any("pruning levels" in reason for reason in policy.reasons)
+
+
+def test_a_simpler_tree_is_chosen_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    levels = judged(_DISAGREEING, [[150, 150]] * 2, [30, 4, 3], [30, 15, 15])
+    monkeypatch.setattr(CrossValidation, "levels", lambda judge, choices: levels)
+    policy = choose(noisy(), LearnOptions(simplest=False, psa=Use.NEVER))
+    assert policy.ccp_alpha == levels.ccp_alphas[1]
+    told = "more leaves and exceptions to explain the rows (30 instead of 15)."
+    assert any(reason.endswith(told) for reason in policy.reasons)
+
+
+@settings(max_examples=25, deadline=None)
+@given(some.tables(min_rows=1, max_rows=40), some.vocabularies)
+def test_the_explanation_of_a_level_is_its_leaves_and_the_rows_it_gets_wrong(
+    rows: DemonstrationTable, vocabulary: Vocabulary
+) -> None:
+    fitted = fit(rows, vocabulary=vocabulary)
+    trees = [fitted.at(ccp_alpha) for ccp_alpha in fitted.path.alphas.tolist()]
+    wrong = [int(np.count_nonzero(one.predict(rows) != rows.chosen)) for one in trees]
+    wanted = [one.tree.leaves + its for one, its in zip(trees, wrong, strict=True)]
+    assert fitted.explanations.tolist() == wanted
+    assert fitted.explanation <= min(wanted)
 
 
 def test_an_alpha_that_is_asked_for_is_used() -> None:

@@ -26,6 +26,8 @@ LEVELS = JudgedLevels(
     np.array([0.0, 0.1]),
     np.array([[[6, 0, 3, 0], [6, 0, 0, 0]]]),
     np.array([[8, 0, 4, 0]]),
+    np.array([3, 2]),
+    np.array([4, 6]),
 )
 
 

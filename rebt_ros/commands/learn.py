@@ -180,8 +180,8 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
         type=_ccp_alpha,
         metavar="ALPHA|auto",
         help="complexity parameter of pruning, larger means smaller trees; auto: the largest "
-        "tree whose mean recall of the actions in cross-validation is not clearly below the best "
-        "(default: auto)",
+        "tree whose mean recall of the actions in cross-validation is not clearly below the best, "
+        "without those that are clearly less simple (default: auto)",
     )
     learning.add_argument(
         "--level",

@@ -101,14 +101,23 @@ class FittedTree:
         Exceptions are the rows that a tree gets wrong.  Of all ways to prune this one it is the
         least number, so that what demonstrators do by mistake counts as that.
         """
-        grown = self.grown
-        sizes = (1 + grown.counts.sum(axis=1) - grown.counts.max(axis=1)).tolist()
+        grown, sizes = self.grown, self._sizes().tolist()
         left, other = grown.left.tolist(), grown.right.tolist()
         # Children come after their parents.
         for node in range(len(grown) - 1, -1, -1):
             if left[node] >= 0:
                 sizes[node] = min(sizes[node], sizes[left[node]] + sizes[other[node]])
         return int(sizes[0])
+
+    @property
+    def explanations(self) -> IntArray:
+        """Leaves and exceptions of the tree at each pruning level, shape (levels,)."""
+        return self.path.sums(self._sizes())
+
+    def _sizes(self) -> IntArray:
+        """What each node adds to an explanation where it is a leaf, shape (nodes,)."""
+        counts = self.grown.counts
+        return np.asarray(1 + counts.sum(axis=1) - counts.max(axis=1))
 
     def right(self, table: DemonstrationTable) -> int:
         """How many rows the tree predicts before it is pruned."""

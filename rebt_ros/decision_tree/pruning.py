@@ -55,10 +55,18 @@ class PruningPath:
 
     def leaf_counts(self) -> IntArray:
         """Leaves of the tree at each level, shape (levels,)."""
+        return self.sums(np.ones(len(self.collapse), dtype=np.int64))
+
+    def sums(self, of_nodes: IntArray) -> IntArray:
+        """The sum over the leaves of the tree at each level, shape (levels,).
+
+        Args:
+            of_nodes: What each node adds where it is a leaf, shape (nodes,).
+        """
         first, end = self.levels_decided(self.alphas)
         change = np.zeros(len(self) + 1, dtype=np.int64)
-        np.add.at(change, first, 1)
-        np.add.at(change, end, -1)
+        np.add.at(change, first, of_nodes)
+        np.add.at(change, end, -of_nodes)
         return np.cumsum(change)[:-1]
 
     def levels_decided(self, ccp_alphas: FloatArray) -> tuple[IntArray, IntArray]:

@@ -6,7 +6,8 @@ What cross-validation decides, it decides on rows that a tree was not learned fr
   simpler (see `FittedTree.explanation`), whatever cross-validation says, or makes it no larger and
   raises the mean recall of unpruned trees after their own choices;
 - whether it may test differences of features, by agreement and size;
-- the pruning level, by mean recall: pruning has to pay (see `selection`);
+- the pruning level, by mean recall, and by the size of the explanation where that leaves much open:
+  pruning has to pay (see `judged_levels`);
 - PSA nodes, by own-history agreement.
 
 Of the trees that fit the rows equally well, the simplest one is taken (see `simplest`).
@@ -129,12 +130,19 @@ def _level(levels: JudgedLevels, shown: DemonstrationTable) -> tuple[float, str]
             f"One demonstration in which actions are begun {begun} times does not tell how far to "
             "prune: the tree is not pruned."
         )
-    recalls, chosen = levels.mean_recalls, levels.chosen
+    recalls, chosen, largest = levels.mean_recalls, levels.chosen, levels.largest
     ccp_alpha = float(levels.ccp_alphas[chosen])
+    simpler = ""
+    if chosen != largest:
+        size, larger = levels.explanations[chosen], levels.explanations[largest]
+        simpler = (
+            ", without those that take clearly more leaves and exceptions to explain the rows "
+            f"({larger} instead of {size})"
+        )
     return ccp_alpha, (
         f"Of {len(recalls)} pruning levels, ccp_alpha = {ccp_alpha:.3g} makes the largest tree "
         f"whose mean recall ({recalls[chosen]:.1%}) is not clearly below the best "
-        f"({recalls[levels.best]:.1%}; {recalls[0]:.1%} unpruned)."
+        f"({recalls[levels.best]:.1%}; {recalls[0]:.1%} unpruned){simpler}."
     )
 
 

@@ -134,7 +134,10 @@ class CrossValidation:
         return np.array(counts)
 
     def _judged(self, ccp_alphas: FloatArray, hits: list[IntArray]) -> JudgedLevels:
-        return JudgedLevels(ccp_alphas, np.array(hits), self._shown)
+        fitted = self.fitted
+        level = np.searchsorted(fitted.path.alphas, ccp_alphas, side="right") - 1
+        leaves, explanations = fitted.path.leaf_counts()[level], fitted.explanations[level]
+        return JudgedLevels(ccp_alphas, np.array(hits), self._shown, leaves, explanations)
 
     def _run(self, fold: int, ccp_alphas: FloatArray, choices: Choices) -> IntArray:
         """The hits of a fold's trees at some levels, after their own choices."""

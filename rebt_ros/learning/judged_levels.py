@@ -4,6 +4,10 @@ The largest tree is chosen that is not clearly worse than the best one: by more 
 of a standard error of their difference, fold by fold.  Where demonstrators err, large trees are
 clearly worse, and pruned.  Elsewhere the few rows that decide a task stay.
 
+Few demonstrations often leave that open, also where they err.  Then a tree that parts each mistake
+from the rows around it has more leaves than a smaller one has leaves and exceptions.  Where that is
+clear, by a standard error of such counts, the smaller one is chosen.
+
 The usual rule of one standard error (Breiman et al., 1984) is another one: it takes the smallest
 tree, and an error that measures how much demonstrations differ instead of how much trees do.
 """
@@ -19,6 +23,8 @@ from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 #: Standard errors of a difference from which on it is clear.  A difference that a single fold makes
 #: is one standard error large, and clear; one on which folds disagree is not.
 _CLEAR = 0.75
+#: With fewer rows for each leaf, the size of an explanation tells nothing.
+_LEAST_ROWS_PER_LEAF = 10
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -31,6 +37,10 @@ class JudgedLevels:
     """Rows of each action on which a level takes it, shape (folds, levels, actions)."""
     shown: IntArray
     """Rows of each action, shape (folds, actions)."""
+    leaves: IntArray
+    """Leaves of the tree of all rows, shape (levels,)."""
+    explanations: IntArray
+    """Leaves and exceptions of that tree, shape (levels,); see `FittedTree.explanation`."""
 
     @property
     def scores(self) -> FloatArray:
@@ -67,9 +77,27 @@ class JudgedLevels:
 
     @property
     def chosen(self) -> int:
+        """The largest tree that is neither clearly worse nor clearly less simple than another one.
+
+        It is not smaller than the best.
+        """
+        as_good, sizes = self._as_good, self.explanations[: self.best + 1]
+        least = sizes[as_good].min()
+        chosen = int(np.argmax(as_good & (sizes - least <= np.sqrt(sizes + least))))
+        # Few rows are explained by many small trees, most of them by chance.
+        told = self.shown.sum() >= _LEAST_ROWS_PER_LEAF * self.leaves[chosen]
+        return chosen if told else self.largest
+
+    @property
+    def largest(self) -> int:
         """The largest tree that is not clearly worse than the best."""
-        contributions, best = self.contributions, self.best
-        return int(np.argmax(~_clearly_above_zero(contributions[:, [best]] - contributions)))
+        return int(np.argmax(self._as_good))
+
+    @property
+    def _as_good(self) -> BoolArray:
+        """Whether each level, up to the best, is not clearly worse than it, shape (best + 1,)."""
+        contributions = self.contributions[:, : self.best + 1]
+        return ~_clearly_above_zero(contributions[:, -1:] - contributions)
 
     def at(self, ccp_alpha: float) -> int:
         """The level that a ``ccp_alpha`` comes to."""

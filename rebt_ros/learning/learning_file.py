@@ -41,7 +41,7 @@ MOST_VALUES = 2_000_000
 
 _TREE = ("left", "right", "column", "threshold", "counts", "risk")
 _TABLE = ("states", "chosen", "demonstration", "stamps", "previous")
-_LEVELS = ("ccp_alphas", "hits", "shown")
+_LEVELS = ("ccp_alphas", "hits", "shown", "leaves", "explanations")
 
 
 def write_learning(directory: Path, learning: Learning) -> tuple[str, ...]:
@@ -174,6 +174,8 @@ def _restored(words: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) 
             _of(arrays, "levels.ccp_alphas", np.float64),
             _of(arrays, "levels.hits", np.int64, 3),
             _of(arrays, "levels.shown", np.int64, 2),
+            _of(arrays, "levels.leaves", np.int64),
+            _of(arrays, "levels.explanations", np.int64),
         )
     policy = ChosenPolicy(
         fitted, float(words["ccp_alpha"]), evidence.psa, levels, _texts(words, "reasons")
