@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.fitted import TrainedTree
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.table import DemonstrationTable
 
@@ -21,9 +21,8 @@ def train(
     """Fits a decision tree and prunes it at `ccp_alpha`; see `fit`."""
     fitted = fit(
         table,
-        vocabulary=vocabulary,
-        max_depth=max_depth,
-        random_state=random_state,
-        upsample=upsample,
+        FitOptions(
+            vocabulary=vocabulary, max_depth=max_depth, random_state=random_state, upsample=upsample
+        ),
     )
     return fitted.at(ccp_alpha)

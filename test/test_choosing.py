@@ -15,7 +15,7 @@ from pruned_trees import train
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -201,8 +201,10 @@ def test_folds_are_whole_demonstrations_or_stretches_of_the_only_one() -> None:
 def test_levels_are_judged_by_trees_that_were_not_shown_a_fold_after_what_the_demonstrator_did(
     table: DemonstrationTable, vocabulary: Vocabulary
 ) -> None:
-    levels = CrossValidation(table, vocabulary=vocabulary).levels(lambda trained, rows: NOBODY)
-    alphas = fit(table, vocabulary=vocabulary).path.alphas
+    levels = CrossValidation(table, FitOptions(vocabulary=vocabulary)).levels(
+        lambda trained, rows: NOBODY
+    )
+    alphas = fit(table, FitOptions(vocabulary=vocabulary)).path.alphas
     assert levels.ccp_alphas.tolist() == alphas.tolist()
     middles = np.sqrt(alphas * np.append(alphas[1:], alphas[-1]))
     number = folds(table)
@@ -210,7 +212,7 @@ def test_levels_are_judged_by_trees_that_were_not_shown_a_fold_after_what_the_de
         rows = table.where(number == fold)
         # Each row keeps the previous action that it has in the whole table.
         assert rows.previous.tolist() == table.previous[number == fold].tolist()
-        fitted = fit(table.where(number != fold), vocabulary=vocabulary)
+        fitted = fit(table.where(number != fold), FitOptions(vocabulary=vocabulary))
         for level, middle in enumerate(middles):
             right = fitted.at(middle).predict(rows) == rows.chosen
             wanted = np.bincount(rows.chosen[right], minlength=len(table.actions))
@@ -226,14 +228,14 @@ def test_rows_that_are_held_out_have_no_say_but_are_in_the_tree_of_all_rows(
     held_out = table.held_out(fraction)
     shown = table.where(~held_out)
     assume(len(shown) > 1)
-    judge = CrossValidation(table, vocabulary=vocabulary, held_out=held_out)
-    alone = CrossValidation(shown, vocabulary=vocabulary)
+    judge = CrossValidation(table, FitOptions(vocabulary=vocabulary), held_out=held_out)
+    alone = CrossValidation(shown, FitOptions(vocabulary=vocabulary))
     levels, wanted = judge.teacher_forced(), alone.teacher_forced()
     assert levels.ccp_alphas.tolist() == wanted.ccp_alphas.tolist()
     assert levels.hits.tolist() == wanted.hits.tolist()
     assert levels.shown.tolist() == wanted.shown.tolist()
     assert judge.fitted.at(0.0).tree == alone.fitted.at(0.0).tree
-    assert judge.of_all.at(0.0).tree == fit(table, vocabulary=vocabulary).at(0.0).tree
+    assert judge.of_all.at(0.0).tree == fit(table, FitOptions(vocabulary=vocabulary)).at(0.0).tree
 
 
 #: What nothing is chosen by.
@@ -361,7 +363,7 @@ def by_hand(rows: DemonstrationTable, vocabulary: Vocabulary) -> list[float]:
 
 def explanation_by_hand(rows: DemonstrationTable, vocabulary: Vocabulary) -> int:
     """Leaves and wrong rows, of the pruning level where they are fewest or of a better cut."""
-    fitted = fit(rows, vocabulary=vocabulary)
+    fitted = fit(rows, FitOptions(vocabulary=vocabulary))
     sizes = []
     for ccp_alpha in fitted.path.alphas.tolist():
         trained = fitted.at(ccp_alpha)
@@ -379,9 +381,9 @@ def test_history_is_tested_where_it_makes_the_explanation_simpler_or_raises_reca
     gained = {}
     for vocabulary in (FEATURES_ALONE, some.PREVIOUS):
         gained[vocabulary] = by_hand(rows, vocabulary)
-        unpruned = CrossValidation(rows, vocabulary=vocabulary).unpruned()
+        unpruned = CrossValidation(rows, FitOptions(vocabulary=vocabulary)).unpruned()
         assert unpruned.mean_recalls[0] == pytest.approx(sum(gained[vocabulary]))
-        explanation[vocabulary] = fit(rows, vocabulary=vocabulary).explanation
+        explanation[vocabulary] = fit(rows, FitOptions(vocabulary=vocabulary)).explanation
         # Levels of cost-complexity pruning are some of the ways to prune.
         assert explanation[vocabulary] <= explanation_by_hand(rows, vocabulary)
     with_it, without = explanation[some.PREVIOUS], explanation[FEATURES_ALONE]
@@ -523,7 +525,7 @@ def test_what_a_tree_is_judged_by_is_what_its_behavior_tree_chooses(
     psa: bool,
 ) -> None:
     options = replace(options, reductions=None) if paper else options
-    trained = fit(table, vocabulary=vocabulary, max_depth=options.max_depth).at(0.01)
+    trained = fit(table, FitOptions(vocabulary=vocabulary, max_depth=options.max_depth)).at(0.01)
     tree = convert(trained, options, psa=psa)
     for rows in (table, other):
         chosen = own_history_choices(trained, rows, options, psa=psa)

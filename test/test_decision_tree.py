@@ -26,7 +26,7 @@ from rebt_ros.decision_tree.encoding import (
 )
 from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.decision_tree.simplest import simplest
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import NO_ACTION, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
@@ -409,7 +409,7 @@ def test_moved_thresholds_change_no_row_that_was_shown_and_decide_in_double_prec
     max_depth: int | None,
     ccp_alpha: float,
 ) -> None:
-    fitted = fit(table, vocabulary=vocabulary, max_depth=max_depth)
+    fitted = fit(table, FitOptions(vocabulary=vocabulary, max_depth=max_depth))
     exact, moved = fitted.at(ccp_alpha), fitted.readable_at(ccp_alpha, table)
     assert exact.thresholds is None
     assert moved.thresholds is not None
@@ -487,7 +487,7 @@ def test_the_simplest_tree_explains_as_much_with_no_more_leaves(
     vocabulary: Vocabulary,
     max_depth: int,
 ) -> None:
-    greedy = fit(table, vocabulary=vocabulary, max_depth=max_depth)
+    greedy = fit(table, FitOptions(vocabulary=vocabulary, max_depth=max_depth))
     simple = simplest(table, greedy)
     assert simple is greedy or simple.leaves < greedy.leaves
     assert simple.right(table) >= greedy.right(table)

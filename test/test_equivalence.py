@@ -31,7 +31,7 @@ from rebt_ros.beyond_the_paper.priority_root import reduced_tree
 from rebt_ros.beyond_the_paper.reductions import Reductions
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.fitted import TrainedTree
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
@@ -239,7 +239,9 @@ def test_the_behavior_tree_chooses_what_the_decision_tree_predicts_at_every_feas
 def test_a_tree_with_readable_thresholds_is_chosen_by_exactly(
     table: DemonstrationTable, vocabulary: Vocabulary, root: Root, ccp_alpha: float
 ) -> None:
-    trained = fit(table, vocabulary=vocabulary, max_depth=4).readable_at(ccp_alpha, table)
+    trained = fit(table, FitOptions(vocabulary=vocabulary, max_depth=4)).readable_at(
+        ccp_alpha, table
+    )
     feasible = feasible_states(trained.tree, table)
     expected = trained.predict(feasible)
     rules = leaf_rules(trained.tree, lambda leaf: (leaf.most_probable,))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree
-from rebt_ros.decision_tree.training import fit, fit_parts
+from rebt_ros.decision_tree.training import FitOptions, fit, fit_parts
 from rebt_ros.demonstration.table import DemonstrationTable
 
 
@@ -28,10 +28,10 @@ def test_a_part_has_the_tree_of_its_own_table(
 ) -> None:
     rows = st.lists(st.booleans(), min_size=len(table), max_size=len(table)).filter(any)
     parts = [np.array(data.draw(rows)) for _ in range(3)]
-    whole, *of_parts = fit_parts(table, parts, vocabulary=vocabulary)
-    assert same(whole, fit(table, vocabulary=vocabulary))
+    whole, *of_parts = fit_parts(table, parts, FitOptions(vocabulary=vocabulary))
+    assert same(whole, fit(table, FitOptions(vocabulary=vocabulary)))
     for part, fitted in zip(parts, of_parts, strict=True):
-        assert same(fitted, fit(table.where(part), vocabulary=vocabulary))
+        assert same(fitted, fit(table.where(part), FitOptions(vocabulary=vocabulary)))
         assert table.last_where(part).tolist() == table.where(part).last.tolist()
 
 

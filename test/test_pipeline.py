@@ -14,7 +14,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.beyond_the_paper import priority_root
 from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.builder import DemonstrationBuilder, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.last_action import History
@@ -131,7 +131,7 @@ def test_figures_are_those_of_the_tree_that_was_learned_without_the_rows() -> No
     learning = learn_from(table)
     held_out = table.where(learning.held_out)
     assert len(held_out) == 60
-    without = fit(table.where(~learning.held_out), vocabulary=learning.judge.vocabulary)
+    without = fit(table.where(~learning.held_out), FitOptions(vocabulary=learning.judge.vocabulary))
     assert learning.judge.at(0.0).tree == without.at(0.0).tree
     figures = learning.learned.provenance.figures
     own = learning.judge.at(learning.policy.ccp_alpha).predict(held_out)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary, encode
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -48,7 +48,7 @@ vocabularies = st.builds(
 def test_every_level_equals_scikit_learns_own_fit_at_its_alpha(
     table: DemonstrationTable, vocabulary: Vocabulary, max_depth: int | None
 ) -> None:
-    fitted = fit(table, vocabulary=vocabulary, max_depth=max_depth)
+    fitted = fit(table, FitOptions(vocabulary=vocabulary, max_depth=max_depth))
     matrix = encode(table, vocabulary)
     for ccp_alpha in fitted.path.alphas:
         own = DecisionTreeClassifier(max_depth=max_depth, ccp_alpha=ccp_alpha, random_state=0)
@@ -79,7 +79,7 @@ def test_the_levels_are_the_positive_alphas_of_scikit_learns_path(
 def test_hits_of_all_levels_at_once_equal_those_of_each_tree(
     table: DemonstrationTable, other: DemonstrationTable, vocabulary: Vocabulary
 ) -> None:
-    fitted = fit(table, vocabulary=vocabulary)
+    fitted = fit(table, FitOptions(vocabulary=vocabulary))
     # Between the levels as well as on them, and beyond the last one.
     alphas = np.unique(np.concatenate((fitted.path.alphas, fitted.path.alphas * 1.5, [0.7])))
     each = [other.chosen[fitted.at(one).predict(other) == other.chosen] for one in alphas]

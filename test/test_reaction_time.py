@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.last_action import (
     NO_ACTION,
     History,
@@ -216,7 +216,7 @@ def explained(table: DemonstrationTable) -> int:
     place = np.arange(len(table)) - np.searchsorted(table.demonstration, table.demonstration)
     table = table.where(place > 0)
     vocabulary = Vocabulary(history=History.PREVIOUS)
-    trained = fit(table, vocabulary=vocabulary, max_depth=3).at(0.0)
+    trained = fit(table, FitOptions(vocabulary=vocabulary, max_depth=3)).at(0.0)
     return int(np.count_nonzero(trained.predict(table) != table.chosen))
 
 
@@ -338,7 +338,7 @@ def fits(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def counted(table: DemonstrationTable, *, vocabulary: Vocabulary) -> FittedTree:
         rows.append(len(table))
-        return fit(table, vocabulary=vocabulary)
+        return fit(table, FitOptions(vocabulary=vocabulary))
 
     monkeypatch.setattr(reaction_time, "fit", counted)
     return rows

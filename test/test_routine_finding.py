@@ -18,7 +18,7 @@ from rebt_ros.behavior_tree.learned_tree import Suggestion, SuggestionKind
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.beyond_the_paper.routines.finding import find_routines
 from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
@@ -222,7 +222,7 @@ def offered(
     routines: Sequence[FoundRoutine], options: LearnOptions
 ) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
     table = demonstrated()
-    trained = fit(table, vocabulary=some.LAT, max_depth=5).at(0.0)
+    trained = fit(table, FitOptions(vocabulary=some.LAT, max_depth=5)).at(0.0)
     return suggest(table, trained, 0.0, options, routines)
 
 

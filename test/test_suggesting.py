@@ -36,9 +36,9 @@ class Asked:
 def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
     asked = Asked()
 
-    def fit(table: DemonstrationTable, **options: Any) -> FittedTree:
+    def fit(table: DemonstrationTable, options: training.FitOptions) -> FittedTree:
         asked.rows.append(len(table))
-        return training.fit(table, **options)
+        return training.fit(table, options)
 
     def gen_lat_trees(*arguments: Any, least_support: int, **options: Any) -> Any:
         asked.least_support.append(least_support)

@@ -13,7 +13,7 @@ from pruned_trees import train
 from rebt_ros.decision_tree import training
 from rebt_ros.decision_tree.encoding import MISSING, Indicator, Number, Vocabulary, columns, encode
 from rebt_ros.decision_tree.svm_smote import svm_smote
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
@@ -172,7 +172,9 @@ class TestWithImbalancedLearn:
         np.testing.assert_array_equal(first, again)
         assert not np.array_equal(first, other)
         trees = [
-            fit(table, vocabulary=LAT, random_state=3, upsample=Upsampling.SVM_SMOTE).at(0.0)
+            fit(
+                table, FitOptions(vocabulary=LAT, random_state=3, upsample=Upsampling.SVM_SMOTE)
+            ).at(0.0)
             for _ in range(2)
         ]
         assert trees[0].tree == trees[1].tree
@@ -194,7 +196,7 @@ class TestWithImbalancedLearn:
         assert (2 in added) is not (2 in left)
         if count == 1:
             assert left == (2,)
-            [_, note] = fit(table, upsample=Upsampling.SVM_SMOTE).notes
+            [_, note] = fit(table, FitOptions(upsample=Upsampling.SVM_SMOTE)).notes
             assert note == "too few rows resemble each other to upsample 'wave'"
 
     def test_an_action_whose_rows_all_lack_a_number_is_named(self) -> None:

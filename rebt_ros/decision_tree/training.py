@@ -34,27 +34,40 @@ from rebt_ros.demonstration.table import DemonstrationTable
 _MOST_AT_A_TIME = 4
 
 
-def fit(
-    table: DemonstrationTable,
-    *,
-    vocabulary: Vocabulary = FEATURES_ALONE,
-    max_depth: int | None = None,
-    random_state: int = 0,
-    upsample: Upsampling = Upsampling.NONE,
-) -> FittedTree:
+@dataclass(frozen=True, slots=True)
+class FitOptions:
+    """How to fit a decision tree."""
+
+    vocabulary: Vocabulary = FEATURES_ALONE
+    """What the tree may test beside the features."""
+    max_depth: int | None = None
+    """Splits on the longest path; None for no limit."""
+    random_state: int = 0
+    """Decides between equally good splits, and which rows are made up."""
+    upsample: Upsampling = Upsampling.NONE
+    """Rows to fit the tree to beside those of the table; its leaves count them, too."""
+
+    def classifier(self) -> DecisionTreeClassifier:
+        """What is fitted."""
+        return DecisionTreeClassifier(
+            criterion="gini", max_depth=self.max_depth, random_state=self.random_state
+        )
+
+
+#: How a tree is fitted where nothing is said.
+PLAIN = FitOptions()
+
+
+def fit(table: DemonstrationTable, options: FitOptions = PLAIN) -> FittedTree:
     """Fits a decision tree.
 
     Args:
         table: At least one row.
-        vocabulary: What the tree may test beside the features.
-        max_depth: Splits on the longest path; None for no limit.
-        random_state: Decides between equally good splits, and which rows are made up.
-        upsample: Rows to fit the tree to beside those of the table; its leaves count them, too.
+        options: How.
 
     Raises:
         OptionError: Upsampling needs a package that is not installed.
     """
-    options = _FitOptions(vocabulary, max_depth, random_state, upsample)
     with _quiet():
         return _fitted(table, options)
 
@@ -70,7 +83,7 @@ def fit_again(
         number: Number of the draw.
         share: Of the columns that a split is chosen from, in (0, 1].
     """
-    options = _FitOptions(
+    options = FitOptions(
         fitted.vocabulary, fitted.max_depth, fitted.random_state + number, Upsampling.NONE
     )
     classifier = options.classifier().set_params(max_features=share)
@@ -81,29 +94,19 @@ def fit_again(
 
 
 def fit_parts(
-    table: DemonstrationTable,
-    parts: Sequence[BoolArray],
-    *,
-    vocabulary: Vocabulary = FEATURES_ALONE,
-    max_depth: int | None = None,
-    random_state: int = 0,
-    upsample: Upsampling = Upsampling.NONE,
+    table: DemonstrationTable, parts: Sequence[BoolArray], options: FitOptions = PLAIN
 ) -> Iterator[FittedTree]:
     """Fits a decision tree to the table and one to each part, on several cores; see `fit`.
 
     Args:
         table: All rows.
         parts: Rows of each part, shape (rows,); as in `DemonstrationTable.where`.
-        vocabulary: As for `fit`, like all that follow.
-        max_depth: Splits on the longest path.
-        random_state: Of each fit.
-        upsample: Of each part.
+        options: Of each fit.
 
     Yields:
         The tree of the table, then those of the parts.
     """
-    options = _FitOptions(vocabulary, max_depth, random_state, upsample)
-    if upsample is not Upsampling.NONE:
+    if options.upsample is not Upsampling.NONE:
         # The library that upsampling is done with is not known to stand threads.
         for rows in (np.ones(len(table), dtype=bool), *parts):
             with _quiet():
@@ -123,7 +126,7 @@ class _Parts:
     """
 
     def __init__(
-        self, table: DemonstrationTable, parts: Sequence[BoolArray], options: _FitOptions
+        self, table: DemonstrationTable, parts: Sequence[BoolArray], options: FitOptions
     ) -> None:
         self._table, self._parts, self._options = table, parts, options
         # LAT of a part differs where rows before are missing: those rows are appended.
@@ -171,19 +174,6 @@ def _changed(table: DemonstrationTable, part: BoolArray) -> _Changed:
     return rows[differing], last[differing]
 
 
-@dataclass(frozen=True, slots=True)
-class _FitOptions:
-    vocabulary: Vocabulary
-    max_depth: int | None
-    random_state: int
-    upsample: Upsampling
-
-    def classifier(self) -> DecisionTreeClassifier:
-        return DecisionTreeClassifier(
-            criterion="gini", max_depth=self.max_depth, random_state=self.random_state
-        )
-
-
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Without a warning that takes actions, which are codes here, for a regression's numbers.
@@ -195,7 +185,7 @@ def _quiet() -> Iterator[None]:
         yield
 
 
-def _fitted(table: DemonstrationTable, options: _FitOptions) -> FittedTree:
+def _fitted(table: DemonstrationTable, options: FitOptions) -> FittedTree:
     vocabulary, random_state = options.vocabulary, options.random_state
     matrix, chosen = encode(table, vocabulary), table.chosen
     notes: tuple[str, ...] = ()
@@ -211,7 +201,7 @@ def _fitted(table: DemonstrationTable, options: _FitOptions) -> FittedTree:
 def _as_fitted(
     table: DemonstrationTable,
     classifier: DecisionTreeClassifier,
-    options: _FitOptions,
+    options: FitOptions,
     notes: tuple[str, ...] = (),
 ) -> FittedTree:
     grown = _grown(classifier, len(table.actions))

@@ -34,6 +34,7 @@ from rebt_ros.errors import OptionError
 from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.conversion import own_history_choices
 from rebt_ros.learning.cross_validation import MOST_FOLDS, CrossValidation
+from rebt_ros.learning.fitting import fit_options
 from rebt_ros.learning.judged_levels import JudgedLevels, clearly_raised
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.logic.conditions import Difference
@@ -157,13 +158,7 @@ def _of_another_fit(
 
 def _unjudged(table: DemonstrationTable, options: LearnOptions) -> ChosenPolicy:
     """Without cross-validation: no pruning, history and PSA only where they are asked for."""
-    fitted = fit(
-        table,
-        vocabulary=Vocabulary(options.history or History.NONE),
-        max_depth=options.max_depth,
-        random_state=options.random_state,
-        upsample=options.upsample,
-    )
+    fitted = fit(table, fit_options(options, Vocabulary(options.history or History.NONE)))
     reason = f"{len(table)} rows are too few to choose by: the tree is not pruned."
     ccp_alpha = _asked_for(fitted, options) or 0.0
     return ChosenPolicy(fitted, ccp_alpha, options.psa is Use.ALWAYS, None, (reason,))
@@ -193,13 +188,9 @@ class _Choice:
         telling = telling and self._telling is not self.shown
         key = telling, vocabulary
         if key not in self._made:
-            options = self._options
             self._made[key] = CrossValidation(
                 self._telling if telling else self._table,
-                vocabulary=vocabulary,
-                max_depth=options.max_depth,
-                random_state=options.random_state,
-                upsample=options.upsample,
+                fit_options(self._options, vocabulary),
                 step=self._step,
                 held_out=None if telling else self._held_out,
             )
@@ -235,14 +226,7 @@ class _Choice:
 
     def _fitted(self, vocabulary: Vocabulary) -> FittedTree:
         """Fitted to the rows that tell what a tree may test."""
-        options = self._options
-        return fit(
-            self._telling,
-            vocabulary=vocabulary,
-            max_depth=options.max_depth,
-            random_state=options.random_state,
-            upsample=options.upsample,
-        )
+        return fit(self._telling, fit_options(self._options, vocabulary))
 
     def _differences(self, vocabulary: Vocabulary) -> tuple[Difference, ...]:
         options = self._options

@@ -15,10 +15,8 @@ from collections.abc import Callable
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
-from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree, TrainedTree
-from rebt_ros.decision_tree.training import fit_parts
-from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.decision_tree.training import PLAIN, FitOptions, fit_parts
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning.evaluation import decision_tree_choices
@@ -44,10 +42,7 @@ class CrossValidation:
 
     Args:
         table: At least two rows.
-        vocabulary: What the trees may test beside the features.
-        max_depth: Splits on the longest path; None for no limit.
-        random_state: Decides between equally good splits, and which rows are made up.
-        upsample: Rows to fit the trees to beside those of the table; none is judged on them.
+        options: How the trees are fitted; none is judged on rows that were made up.
         step: Called after each tree that was fitted, and each fold in which trees were run.
         held_out: Rows that are in no fold, and that no fold's tree is fitted to, shape (rows,).
     """
@@ -55,11 +50,8 @@ class CrossValidation:
     def __init__(
         self,
         table: DemonstrationTable,
+        options: FitOptions = PLAIN,
         *,
-        vocabulary: Vocabulary = FEATURES_ALONE,
-        max_depth: int | None = None,
-        random_state: int = 0,
-        upsample: Upsampling = Upsampling.NONE,
         step: Callable[[], None] = lambda: None,
         held_out: BoolArray | None = None,
     ) -> None:
@@ -77,10 +69,7 @@ class CrossValidation:
                 *([] if held_out is None else [inside]),
                 *(inside & (fold != number) for number in numbers),
             ],
-            vocabulary=vocabulary,
-            max_depth=max_depth,
-            random_state=random_state,
-            upsample=upsample,
+            options,
         ):
             trees.append(tree)
             step()

@@ -26,7 +26,7 @@ import numpy as np
 
 from rebt_ros.arrays import IntArray
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.lags import evenly_spaced
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -213,7 +213,7 @@ class _Explanations:
             before=None,
             previous=table.previous[rows],
         )
-        return fit(late, vocabulary=vocabulary).explanation
+        return fit(late, FitOptions(vocabulary=vocabulary)).explanation
 
 
 def _stretches(rows: IntArray) -> IntArray:

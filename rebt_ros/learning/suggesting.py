@@ -16,6 +16,7 @@ from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, part_of
+from rebt_ros.learning.fitting import fit_options
 from rebt_ros.learning.options import LearnOptions
 from rebt_ros.learning.suggestions import lat_suggestions, psa_suggestions, routine_suggestions
 from rebt_ros.paper.lat_occurrences import Occurrences, rows
@@ -80,10 +81,7 @@ def suggest(
     if trained.vocabulary.history is not History.LAST:
         fitted = fit(
             table if options.is_paper else part_of(table, _MOST_ROWS_FITTED),
-            vocabulary=Vocabulary(History.LAST),
-            max_depth=options.max_depth,
-            random_state=options.random_state,
-            upsample=options.upsample,
+            fit_options(options, Vocabulary(History.LAST)),
         )
         with_lat = fitted.at(ccp_alpha)
     if _too_large(with_lat, options):

@@ -16,7 +16,7 @@ import numpy as np
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.decision_tree.encoding import Vocabulary
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning import evaluation
@@ -49,7 +49,7 @@ def held_out_agreements(table: DemonstrationTable) -> dict[Mode, Agreement]:
 def _trees(mode: Mode, table: DemonstrationTable) -> Iterator[nodes.Node]:
     """The main trees to choose from, the smallest first."""
     for history in (History.NONE, History.LAST) if mode is Mode.DEFAULT else (History.LAST,):
-        fitted = fit(table, vocabulary=Vocabulary(history), max_depth=MAX_DEPTH)
+        fitted = fit(table, FitOptions(vocabulary=Vocabulary(history), max_depth=MAX_DEPTH))
         alphas = fitted.path.alphas
         even = np.linspace(0, len(alphas) - 1, min(len(alphas), _MOST_LEVELS)).astype(int)
         for alpha in reversed(alphas[even].tolist()):

@@ -14,7 +14,7 @@ from rebt_ros.beyond_the_paper.routines.finding import find_routines
 from rebt_ros.beyond_the_paper.routines.found_routine import FoundRoutine
 from rebt_ros.decision_tree.encoding import Vocabulary
 from rebt_ros.decision_tree.fitted import TrainedTree
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.errors import InputError, RebtError
@@ -123,7 +123,7 @@ def _levels(table: DemonstrationTable) -> dict[Mode, list[_Level]]:
     made: dict[Mode, list[_Level]] = {mode: [] for mode in Mode}
     if len(table.actions) < 2:
         return made
-    fitted = fit(table, vocabulary=Vocabulary(History.LAST), max_depth=MAX_DEPTH)
+    fitted = fit(table, FitOptions(vocabulary=Vocabulary(History.LAST), max_depth=MAX_DEPTH))
     routines = find_routines(table)
     occurrences = occurrences_in(table)
     for ccp_alpha in fitted.path.alphas.tolist():

@@ -19,7 +19,7 @@ from driving.plain import PlainDriver
 from driving.task import Task
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Figures
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.learning.levels import as_learned
 from rebt_ros.paper.re_bt_espresso import bt_espresso
@@ -75,7 +75,7 @@ def _bt_espresso(task: Task, shown: Sequence[Shown]) -> Made:
         loaded = load(write_tables(Path(directory), task.features, shown))
     start = time.perf_counter()
     (table,) = tabulate(loaded.demonstrations)
-    trained = fit(table, max_depth=_DEPTH).at(0.0)
+    trained = fit(table, FitOptions(max_depth=_DEPTH)).at(0.0)
     tree = bt_espresso(trained.tree)
     seconds = time.perf_counter() - start
     unjudged = Figures(0, None, None, 0)
