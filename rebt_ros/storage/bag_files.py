@@ -70,6 +70,8 @@ class BagFiles:
     """Encoding of the messages of other topics."""
     others_found: Counter[str] = field(default_factory=Counter)
     """Messages of those, by topic."""
+    definitions: dict[str, str] = field(default_factory=dict)
+    """Definitions of types as `.msg` files have them, by name."""
     stated: dict[Topic, int] = field(default_factory=dict)
     """How many the bag says that there are; only where it does."""
     notes: list[str] = field(default_factory=list)
@@ -251,6 +253,8 @@ def _open_mcap(path: Path, name: str, bag: BagFiles) -> None:
     # Not all files of a bag can be open at once where there are thousands.
     with path.open("rb") as file:
         survey = McapFile(file).survey
+    for kind, text in survey.definitions.items():
+        bag.definitions.setdefault(_full(kind), text)
     number = {}
     for channel, about in survey.channels.items():
         if about.encoding == _CDR:
@@ -312,6 +316,8 @@ def _counted(count: int, singular: str, plural: str) -> str:
 
 def _open_sqlite(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
     file = stack.enter_context(sqlite.opened(path))
+    for kind, text in file.definitions():
+        bag.definitions.setdefault(_full(kind), text)
     topics: dict[int, Topic] = {}
     for one in file.topics:
         if one.encoding == _CDR:

@@ -30,6 +30,8 @@ _NO_RECORD: Final = -1
 #: Records of kinds from here on are a program's own.
 _PRIVATE: Final = 0x80
 _KINDS: Final = frozenset({*range(1, 16), *range(_PRIVATE, 0x100)})
+#: Encoding of definitions as `.msg` files have them.
+_MSG: Final = "ros2msg"
 #: Channel, sequence, log time, publish time: before the data of a message.
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 _RECORD_HEAD: Final = struct.Struct("<BQ")
@@ -78,6 +80,8 @@ class Survey:
     """What is in a file."""
 
     channels: dict[int, McapChannel] = field(default_factory=dict)
+    definitions: dict[str, str] = field(default_factory=dict)
+    """Definitions of types as `.msg` files have them, by name."""
     found: Counter[int] = field(default_factory=Counter)
     """Messages by channel."""
     stated: dict[int, int] | None = None
@@ -241,7 +245,10 @@ class McapFile:
     def _note_schema(self, content: memoryview) -> None:
         with contextlib.suppress(struct.error, UnicodeDecodeError):
             (number,) = struct.unpack_from("<H", content)
-            self._schemas[number], _ = _text(content, 2)
+            self._schemas[number], place = _text(content, 2)
+            encoding, place = _text(content, place)
+            if encoding == _MSG:
+                self.survey.definitions[self._schemas[number]], _ = _text(content, place)
 
     def _note_channel(self, content: memoryview) -> None:
         with contextlib.suppress(struct.error, UnicodeDecodeError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, Final
 
@@ -11,6 +12,7 @@ from rosbags.typesys.base import normalize_fieldname
 
 from rebt_ros.message_path.definition import FILLER, Field, MessageType, Primitive
 from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.storage.message_definitions import Definitions, is_known, parse_definitions
 from rebt_ros.storage.partial_messages import Attributes, PartialDecoder
 
 #: Bytes before the values of a message, and what tells their order.
@@ -41,8 +43,11 @@ class BagTypes:
     """
 
     def __init__(self, definitions: Mapping[str, str] | None = None) -> None:
-        self._definitions = definitions or {}
+        self._texts = definitions or {}
         self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._own: Definitions = {}
+        self._fields = ChainMap[str, Any](self._own, dict(self._store.fielddefs))
+        self._decoders: dict[str, Callable[[bytes], object]] = {}
         self._known: dict[str, MessageType] = {}
 
     def __call__(self, name: str) -> MessageType:
@@ -61,6 +66,10 @@ class BagTypes:
         Raises:
             Exception: The data are no such message; rosbags raises whatever it meets.
         """
+        if name in self._own:
+            if name not in self._decoders:
+                self._decoders[name] = PartialDecoder(name, [()], self._fields).decode
+            return self._decoders[name](data)
         order = data[:2]
         if len(data) < _HEAD or order not in (_BIG, _LITTLE):
             raise ValueError("it does not begin like a message")
@@ -79,16 +88,21 @@ class BagTypes:
             wanted: Attributes that lead to values, or to messages with all that is in them.
         """
         try:
-            return PartialDecoder(name, wanted, self._store.fielddefs).decode
+            return PartialDecoder(name, wanted, self._fields).decode
         except NotImplementedError:
             return lambda data: self.decode(data, name)
 
     def _definition(self, name: str) -> MessageType:
-        if name not in self._store.fielddefs:
+        if name not in self._fields and name in self._texts:
+            for kind, its in parse_definitions(name, self._texts[name]).items():
+                if kind not in self._store.fielddefs:
+                    self._own.setdefault(kind, its)
+        if not is_known(name, self._fields):
+            self._own.pop(name, None)
             raise MessagePathError(
                 f"the type {name} is none of ROS 2 Jazzy, and the bag does not define it."
             )
-        constants, fields = self._store.fielddefs[name]
+        constants, fields = self._fields[name]
         return MessageType(
             name,
             tuple(_field(field, its) for field, its in fields if field != FILLER),

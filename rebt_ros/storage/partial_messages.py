@@ -157,7 +157,35 @@ class _Numbers:
         return end
 
 
-_Part: TypeAlias = _Stretch | _Text | _Texts | _Numbers
+@dataclass(frozen=True, slots=True)
+class _Records:
+    """Messages, in an array of fixed length or a sequence."""
+
+    parts: list[_Part]
+    build: Callable[[Sequence[Any]], SimpleNamespace]
+    count: int | None
+    """None for a sequence."""
+    wanted: bool
+
+    def read(self, data: bytes, place: int, order: str, into: list[Any]) -> int:
+        """See `_Stretch.read`."""
+        count = self.count
+        if count is None:
+            place, count = _length(data, place, order)
+        if count > len(data):
+            raise ValueError("a sequence is longer than its message")
+        records: list[Any] = []
+        for _ in range(count):
+            values: list[Any] = []
+            for part in self.parts:
+                place = part.read(data, place, order, values)
+            records.append(self.build(values))
+        if self.wanted:
+            into.append(records)
+        return place
+
+
+_Part: TypeAlias = _Stretch | _Text | _Texts | _Numbers | _Records
 
 
 def _length(data: bytes, place: int, order: str) -> tuple[int, int]:
@@ -176,8 +204,8 @@ class PartialDecoder:
         definitions: Fields of each type, as rosbags knows them.
 
     Raises:
-        NotImplementedError: The type has, up to the last wanted field, what is not read here, such
-            as sequences of messages.
+        NotImplementedError: The type has, up to the last wanted field, what is not read here:
+            arrays of strings that have a fixed length, and wide strings.
     """
 
     def __init__(
@@ -189,6 +217,7 @@ class PartialDecoder:
         ]
         while leaves and not leaves[-1][-1]:
             leaves.pop()
+        self._definitions = definitions
         self._parts: list[_Part] = []
         for _, node, about, is_wanted in leaves:
             self._add(node, about, is_wanted)
@@ -216,6 +245,10 @@ class PartialDecoder:
         name = element[1][0] if element[0] == Nodetype.BASE else ""
         if name == "string" and node != Nodetype.ARRAY:
             self._parts.append(_Text(wanted) if single else _Texts(wanted))
+        elif element[0] == Nodetype.NAME:
+            inner = PartialDecoder(element[1], [()], self._definitions)
+            count = about[1] if node == Nodetype.ARRAY else None
+            self._parts.append(_Records(inner._parts, inner._build, count, wanted))
         elif name not in _FIXED:
             raise NotImplementedError(f"{element} is not read here")
         elif node == Nodetype.SEQUENCE:

@@ -10,7 +10,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Final
 
-from rebt_ros.demonstration.builder import DemonstrationBuilder
+from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.errors import InputError, printable
 from rebt_ros.robot_file.binding import BoundTopic, bind
@@ -65,7 +65,7 @@ def read_robot_bag(
     if not robot.actions:
         raise InputError(f"{robot.name} has no part 'actions', so that a bag shows no actions.")
     with opened_bag(path) as bag:
-        types = BagTypes()
+        types = BagTypes(bag.definitions)
         with with_notes(bag):
             kinds = kinds_of(bag)
             if not kinds:
@@ -124,13 +124,20 @@ class _RobotFeed(Feed):
         except Exception as err:  # whatever the generated decoders meet
             raise UndecodableError from err
         rows: list[Row] = []
+        refused: BadMessageError | None = None
         # What is done follows from what was there before this message.
         for channel, labeller in bound.labellers.items():
             for label in labeller.labels(message, stamp):
-                rows += self.builder.act(stamp, channel, label)
+                try:
+                    rows += self.builder.act(stamp, channel, label)
+                except BadMessageError as err:
+                    refused = err
         reader = self.readers.get(bound.name)
         if reader is not None:
+            # The state is there whatever becomes of the action.
             rows += self.builder.observe(stamp, bound.name, reader.read(message, stamp))
+        if refused is not None and not (rows and self.skip_bad):
+            raise refused
         return tuple(rows)
 
 

@@ -68,6 +68,23 @@ class SqliteFile:
         known = {topic.number for topic in self.topics}
         return sum(count for number, count in self.found.items() if number not in known)
 
+    def definitions(self) -> list[tuple[str, str]]:
+        """Types with their definitions as `.msg` files have them, if those can be read."""
+        with (
+            contextlib.suppress(sqlite3.Error),
+            contextlib.closing(_connected(self.path)) as connection,
+        ):
+            found = connection.execute(
+                "SELECT topic_type, encoded_message_definition FROM message_definitions "
+                "WHERE encoding = 'ros2msg' LIMIT 1000"
+            ).fetchall()
+            return [
+                (kind, text)
+                for kind, text in found
+                if isinstance(kind, str) and isinstance(text, str)
+            ]
+        return []
+
     def messages(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         """Topic, stamp and data of the messages of some topics, by their stamps.
 
