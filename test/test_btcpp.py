@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -122,7 +123,11 @@ def _differences(
             yield f"interrupted: {before} here, {after} there"
 
 
-@settings(max_examples=500)
+#: Random trees; more for a campaign.
+TREES = int(os.environ.get("REBT_ROS_BTCPP", "500"))
+
+
+@settings(max_examples=TREES)
 @given(
     ONE_CHANNEL | CHANNELS, st.integers(0, 10**6), st.sampled_from(RowKind), st.integers(0, TICKS)
 )
@@ -178,14 +183,14 @@ AFTER_GO, LAST_GO = Literal(PreviousActionIs("go")), Literal(LastActionIs("go", 
         ),
         pytest.param(
             nodes.Selector((some.when(AFTER_GO, then=TURN), GO)),
-            "previous_action := ended",
-            "previous_action := running",
+            "_previous_action := _ended",
+            "_previous_action := _running",
             id="previous action",
         ),
         pytest.param(
             nodes.Selector((some.when(LAST_GO, then=TURN), some.when(NEAR, then=GO), WAIT)),
-            "last_action_before_turn := next_last_action_before_turn",
-            "next_last_action_before_turn := ''",
+            "_last_action_before_turn := _next_last_action_before_turn",
+            "_next_last_action_before_turn := ''",
             id="last action",
         ),
     ],
@@ -233,6 +238,8 @@ def test_it_is_a_part_of_a_larger_tree_as_the_docs_say() -> None:
     tree.tick_exactly_once()
     tree.tick_exactly_once()
     assert done == ["go", "turn", "go", "turn", "wait"]
+    # What it remembers is its own.
+    assert set(tree.root_blackboard().get_keys()) == {"distance"}
 
 
 def test_a_variable_that_was_never_set_stops_the_tree_with_its_name() -> None:

@@ -88,12 +88,10 @@ class _Export:
             self._policies = dict.fromkeys(self._policies, self._tree)
         self._variables: Mapping[str, Variable] = variables(learned, self._tree)
         labels = texts((action.label for action in learned.actions), "action")
-        taken = [variable.name for variable in self._variables.values()]
         self._memories = memories(
             self._policies or {learned.actions[0].channel: self._tree},
             labels,
             learned.row_kind,
-            ["ID", "name", *taken],
         )
         self._ids = _ids(nodes.actions(self._tree))
 
@@ -170,12 +168,14 @@ class _Export:
 
     def _action(self, action: nodes.Action) -> Element:
         """The action, by its own name: BehaviorTree.CPP 4.8 refuses <Action> in some places."""
-        element = Element(self._ids[action], name=_line(self._wording.node(action)))
+        element = Element(self._ids[action])
+        if (name := _line(self._wording.node(action))) != element.tag:
+            element.set("name", name)
         memory = self._memories.get(action.channel)
         if memory is None or not (noted := memory.act(action.label)):
             return element
         _assign(element, "_post", memory.done(action.label))
-        both = Element("ReactiveSequence", name=element.attrib["name"])
+        both = Element("ReactiveSequence", name=name)
         _assign(SubElement(both, "Script"), "code", noted)
         both.append(element)
         return both

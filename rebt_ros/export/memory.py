@@ -7,7 +7,7 @@ it.  What is remembered is what `TreeRuntime` remembers.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rebt_ros.behavior_tree import nodes
@@ -131,7 +131,6 @@ def memories(
     trees: Mapping[str, nodes.Node],
     labels: Mapping[str, str],
     row_kind: RowKind,
-    reserved: Iterable[str],
 ) -> dict[str, Memory]:
     """What the tree of each channel remembers; nothing of those that test nothing.
 
@@ -139,11 +138,10 @@ def memories(
         trees: By their channels.
         labels: The text of each label.
         row_kind: What the previous action is.
-        reserved: Names of variables that are taken.
     """
     tested = {channel: _tested(tree) for channel, tree in trees.items()}
     tested = {channel: conditions for channel, conditions in tested.items() if conditions}
-    reserved = list(reserved)
+    taken: list[str] = []
     found: dict[str, Memory] = {}
     for channel, conditions in tested.items():
         where = f" on {channel}" if len(tested) > 1 else ""
@@ -155,8 +153,10 @@ def memories(
         named = [f"last action{_before(group)}{where}" for group in groups]
         roles = [f"{role}{where}" for role in ("previous action", "ended", "running", "ticked")]
         wanted = [*named, *(f"next {name}" for name in named), *roles]
-        names = [*identifiers(wanted, "memory", reserved).values()]
-        reserved += names
+        plain = identifiers(wanted, "memory", taken).values()
+        taken += plain
+        # Names that begin so are private: no other tree on the same blackboard has them.
+        names = [f"_{name}" for name in plain]
         previous, ended, running, ticked = names[2 * len(groups) :]
         remembers = any(isinstance(one, PreviousActionIs) for one in conditions)
         found[channel] = Memory(
