@@ -68,6 +68,21 @@ def test_what_is_demanded_has_a_branch_before_all_others() -> None:
     assert found.learned.tree == nodes.Selector((some.when(LOW, then=WAIT), GO))
 
 
+def test_where_guards_leave_no_command_the_nearest_rows_say_what_is_done() -> None:
+    shown = some.table(
+        [(0.35, 0.5, 0, 0), (0.4, 0.5, 0, 0), (0.9, 0.1, 0, 0), (0.8, 0.9, 0, 0)], [2, 2, 3, 0]
+    )
+    tree = nodes.Selector((some.when(LOW, then=WAIT), GO))
+    text = "- never: go\n  when: distance <= 0.3\n"
+    found = mended(tree, text, shown)
+    guarded = nodes.Sequence((nodes.Condition(~NEAR), GO))
+    assert found.learned.tree == nodes.Selector((some.when(LOW, then=WAIT), guarded, TURN))
+    # It must not be forbidden itself.
+    both = f"{text}- never: turn\n  when: distance <= 0.2\n"
+    again = mended(tree, both, shown)
+    assert again.learned.tree == nodes.Selector((some.when(LOW, then=WAIT), guarded, WAIT))
+
+
 def test_several_rules_are_kept_at_once_and_rows_are_counted() -> None:
     shown = some.table(
         [(0.1, 0.5, 0, 0), (0.9, 0.5, 0, 0), (0.9, 0.1, 0, 0), (0.2, 0.1, 0, 0)], [0, 0, 0, 2]

@@ -26,7 +26,9 @@ from rebt_ros.verification.proof import (
     policies_of,
     verdicts,
 )
+from rebt_ros.verification.reference import Reference, of_table
 from rebt_ros.verification.rules import Demand
+from rebt_ros.verification.states import StateFinder
 from rebt_ros.verification.sweep import Results, Sweep, Ticks, remembers, sweep
 from rebt_ros.verification.verdict_text import what_breaks
 
@@ -63,7 +65,9 @@ def repair(
     """The tree with the smallest guards in front of actions that break rules.
 
     Where an action is forbidden, a guard stands before it in each branch that breaks the rule, so
-    that the branches after it act there.  Where it is demanded, it has a branch before all others.
+    that the branches after it act there.  Where none does, what was done in the nearest rows that
+    were shown is done, if there are rows.  Where an action is demanded, it has a branch before all
+    others.
 
     Args:
         learned: The tree.
@@ -89,7 +93,7 @@ def repair(
                 sum(map(len, tables)),
             )
         for demand in failed:
-            mended = _guarded(mended, demand, results)
+            mended = _guarded(mended, demand, results, demands, tables)
     raise RuleError(f"the tree cannot be mended by guards: {what_breaks(mended, proofs, found)}.")
 
 
@@ -106,7 +110,13 @@ def _changed(before: LearnedTree, after: LearnedTree, table: DemonstrationTable)
     return int(np.count_nonzero(chosen[0] != chosen[1]))
 
 
-def _guarded(learned: LearnedTree, demand: Demand, results: Results) -> LearnedTree:
+def _guarded(
+    learned: LearnedTree,
+    demand: Demand,
+    results: Results,
+    demands: Sequence[Demand],
+    tables: Sequence[DemonstrationTable],
+) -> LearnedTree:
     policies = policies_of(learned)
     channel = demand.action.channel
     policy = policies.get(channel)
@@ -122,7 +132,67 @@ def _guarded(learned: LearnedTree, demand: Demand, results: Results) -> LearnedT
         raise RuleError(
             f"the tree cannot be mended: nothing is left of it without what breaks '{demand.rule}'."
         )
+    for table in tables:
+        if table.channel == channel:
+            mended = _instead(learned, demand, policy, mended, results, demands, table)
     return _with_policy(learned, channel, mended)
+
+
+def _instead(
+    learned: LearnedTree,
+    demand: Demand,
+    policy: nodes.Node,
+    guarded: nodes.Node,
+    results: Results,
+    demands: Sequence[Demand],
+    table: DemonstrationTable,
+) -> nodes.Node:
+    """The guarded tree with a last branch, where guards have left states without a command.
+
+    Args:
+        learned: The tree before.
+        demand: The rule that the guards are for.
+        policy: The tree of the channel before.
+        guarded: The same with guards.
+        results: How actions end.
+        demands: All rules, which the last branch must not break.
+        table: The rows of the channel.
+    """
+    assert demand.forbids is not None
+    others = [one.forbids for one in demands if one.forbids is not None]
+    grid = grid_of(learned, [policy, guarded], others)
+    done = sweep(guarded, grid, results, Ticks.FIRST)
+    silent = done.boxes[:, done.commanding < 0]
+    before = sweep(policy, grid, results, Ticks.FIRST, grid.within(silent, demand.forbids))
+    if not before.boxes.shape[1] or (before.commanding < 0).any():
+        return guarded
+    for label in _nearest_actions(table, demand.action, before.boxes, grid, learned):
+        action = nodes.Action(label, table.channel)
+        forbidden = [one.forbids for one in demands if one.action == action and one.forbids]
+        if not any(grid.within(before.boxes, one).shape[1] for one in forbidden):
+            tests = _tests(_needed(AllOf((demand.forbids,)), silent, grid))
+            last = nodes.Sequence((*tests, action)) if tests else action
+            return nodes.Selector((*_branches(guarded), last))
+    return guarded
+
+
+def _nearest_actions(
+    table: DemonstrationTable,
+    besides: nodes.Action,
+    boxes: Boxes,
+    grid: Grid,
+    learned: LearnedTree,
+) -> list[str]:
+    """The actions of a table, those first whose rows are nearest to some boxes."""
+    scale = of_table(table).scale
+    away = {}
+    for code in np.unique(table.chosen).tolist():
+        if table.actions[code] != besides.label:
+            states = table.states[table.chosen == code]
+            rows = Reference(states, states, scale, None)
+            distances, _ = StateFinder(grid, learned.features, rows).closest(boxes)
+            away[table.actions[code]] = float(np.mean(distances))
+    return sorted(away, key=away.__getitem__)
 
 
 def _branches(policy: nodes.Node) -> tuple[nodes.Node, ...]:
@@ -250,7 +320,7 @@ def _needed(formula: Formula, here: Boxes, grid: Grid) -> Formula:
             redundant = not grid.within(here, AllOf((*others, negated(part)))).shape[1]
         else:
             redundant = not grid.within(here, AllOf((part, *map(negated, others)))).shape[1]
-        if redundant and others:
+        if redundant and (others or isinstance(formula, AllOf)):
             parts = others
     smaller = tuple(_needed(part, here, grid) for part in parts)
     if len(smaller) == 1:
