@@ -266,7 +266,7 @@ def test_a_simpler_tree_is_chosen_with_a_reason(monkeypatch: pytest.MonkeyPatch)
 def test_the_explanation_of_a_level_is_its_leaves_and_the_rows_it_gets_wrong(
     rows: DemonstrationTable, vocabulary: Vocabulary
 ) -> None:
-    fitted = fit(rows, vocabulary=vocabulary)
+    fitted = fit(rows, FitOptions(vocabulary=vocabulary))
     trees = [fitted.at(ccp_alpha) for ccp_alpha in fitted.path.alphas.tolist()]
     wrong = [int(np.count_nonzero(one.predict(rows) != rows.chosen)) for one in trees]
     wanted = [one.tree.leaves + its for one, its in zip(trees, wrong, strict=True)]

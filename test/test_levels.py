@@ -146,8 +146,8 @@ def test_the_chosen_level_of_all_rows_is_judged_by_the_same_level_without_those_
     assert replace(level.learned, provenance=replace(origin, figures=figures)) == replace(
         published, suggestions=()
     )
-    held_out = learning.table.where(learning.held_out)
-    chosen = learning.judge.at(level.ccp_alpha).predict(held_out)
+    held_out = learning.table.where(learning.evidence.held_out)
+    chosen = learning.evidence.judge.at(level.ccp_alpha).predict(held_out)
     assert origin.figures.own_history_agreement == np.mean(chosen == held_out.chosen)
 
 

@@ -129,12 +129,15 @@ def test_the_end_of_the_only_demonstration_is_learned_too() -> None:
 def test_figures_are_those_of_the_tree_that_was_learned_without_the_rows() -> None:
     table = tabulate([turning_and_going(str(seed), seed) for seed in range(4)])[0]
     learning = learn_from(table)
-    held_out = table.where(learning.held_out)
+    held_out = table.where(learning.evidence.held_out)
     assert len(held_out) == 60
-    without = fit(table.where(~learning.held_out), FitOptions(vocabulary=learning.judge.vocabulary))
-    assert learning.judge.at(0.0).tree == without.at(0.0).tree
+    without = fit(
+        table.where(~learning.evidence.held_out),
+        FitOptions(vocabulary=learning.evidence.judge.vocabulary),
+    )
+    assert learning.evidence.judge.at(0.0).tree == without.at(0.0).tree
     figures = learning.learned.provenance.figures
-    own = learning.judge.at(learning.policy.ccp_alpha).predict(held_out)
+    own = learning.evidence.judge.at(learning.policy.ccp_alpha).predict(held_out)
     assert figures.own_history_agreement == pytest.approx(np.mean(own == held_out.chosen))
 
 

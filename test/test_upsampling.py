@@ -231,7 +231,7 @@ class TestWithImbalancedLearn:
             upsample=Upsampling.SVM_SMOTE,
         )
         learning = pipeline.learn_from(table, options)
-        shown = table.where(~learning.held_out)
+        shown = table.where(~learning.evidence.held_out)
         # Rows that are held out, and each fold's own rows, are neither sources nor made up.
         assert len(shown) == 320
         assert fitted_to[0] == 320
@@ -240,7 +240,7 @@ class TestWithImbalancedLearn:
         assert provenance.rows == 320
         assert provenance.figures.held_out_rows == 80
         assert provenance.figures.fidelity_mismatches == 0
-        held_out = table.where(learning.held_out)
+        held_out = table.where(learning.evidence.held_out)
         agreement = np.mean(learning.decision_tree.predict(held_out) == held_out.chosen)
         assert provenance.figures.teacher_forced_agreement == pytest.approx(agreement)
         assert learning.notes[0].startswith("the decision tree was fitted to")
