@@ -79,7 +79,10 @@ HOMES: Final = {
     ),
     "pyeda": ("rebt_ros.logic.minimize",),
     "rosbags": ("rebt_ros.storage", "rebt_ros.storage.*"),
-    "scipy": ("rebt_ros.study.edit_distance.program", "rebt_ros.study.edit_distance.relaxation"),
+    "scipy": (
+        "rebt_ros.study.edit_distance.integer_program",
+        "rebt_ros.study.edit_distance.relaxation",
+    ),
     "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
     "yaml": ("rebt_ros.robot_file.*", "rebt_ros.verification.rules_file"),
 }

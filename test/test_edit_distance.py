@@ -33,7 +33,7 @@ from rebt_ros.logic.conditions import (
     PreviousActionIs,
 )
 from rebt_ros.study.edit_distance import bounds as bounds_module
-from rebt_ros.study.edit_distance import canonical, program
+from rebt_ros.study.edit_distance import canonical, integer_program
 from rebt_ros.study.edit_distance.bounds import (
     Bounds,
     distance_bounds,
@@ -264,7 +264,7 @@ def test_the_solver_gets_indices_that_old_versions_of_scipy_take(
         solved.append(kwargs["constraints"].A)
         return milp(*args, **kwargs)
 
-    monkeypatch.setattr(program, "milp", spied)
+    monkeypatch.setattr(integer_program, "milp", spied)
     first, second = LabelledTree(("a", "a"), (-1, 0)), LabelledTree(("a", "b"), (-1, 0))
     assert _bounds_with(first, second, _MOST_STEPS=0).upper > 0
     assert {one.dtype for matrix in solved for one in (matrix.indices, matrix.indptr)} == {

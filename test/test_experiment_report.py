@@ -17,7 +17,13 @@ from rebt_ros.study.figures import Contest, Share, mode_figures
 from rebt_ros.study.mode import Mode
 from rebt_ros.study.page import report_page
 from rebt_ros.study.reduction import Size, SizeComparison
-from rebt_ros.study.report import Report, report_csv, report_json, report_of, rows_of_table
+from rebt_ros.study.report import (
+    ExperimentReport,
+    report_csv,
+    report_json,
+    report_of,
+    rows_of_table,
+)
 from rebt_ros.study.results import (
     Agreement,
     ConfigurationResult,
@@ -94,7 +100,7 @@ SETTINGS = Settings(ticks=100, seed=7, networkx_pairs=3)
 
 
 @pytest.fixture
-def report() -> Report:
+def report() -> ExperimentReport:
     return report_of(SETTINGS, (RESULT,), (Lost("expr2", "it broke"),), 12.34)
 
 
@@ -138,7 +144,7 @@ def test_exact_recoveries_reductions_and_what_was_offered_are_counted() -> None:
     assert (default.suggestions_offered.median, default.suggestions_offered.maximum) == (2, 3)
 
 
-def test_the_report_has_the_figures_of_all_modes(report: Report) -> None:
+def test_the_report_has_the_figures_of_all_modes(report: ExperimentReport) -> None:
     value = json.loads(report_json(report))
     default = value["modes"]["default"]
     assert (default["wins"], default["ties"], default["losses"]) == (1, 0, 1)
@@ -156,7 +162,7 @@ def test_the_report_has_the_figures_of_all_modes(report: Report) -> None:
     assert measure["exact_minima"] == [2, 6]
 
 
-def test_the_papers_figures_stand_beside_ours(report: Report) -> None:
+def test_the_papers_figures_stand_beside_ours(report: ExperimentReport) -> None:
     heading, *rows = rows_of_table(report)
     assert heading[1] == "paper (reported)"
     assert {len(row) for row in rows} == {5}
@@ -170,7 +176,7 @@ def test_the_papers_figures_stand_beside_ours(report: Report) -> None:
     assert by_name["recovered exactly"] == ["-", "0 of 2", "0 of 2", "1 of 2"]
 
 
-def test_the_table_of_scores_has_a_line_for_each_subtree_and_mode(report: Report) -> None:
+def test_the_table_of_scores_has_a_line_for_each_subtree_and_mode(report: ExperimentReport) -> None:
     lines = list(csv.DictReader(report_csv(report).splitlines()))
     assert [(line["subtree"], line["mode"]) for line in lines] == [
         *(("1", mode.value) for mode in Mode),
@@ -218,7 +224,7 @@ class _Tags(HTMLParser):
         self.texts.append(data)
 
 
-def test_the_page_is_whole_and_needs_nothing_else(report: Report) -> None:
+def test_the_page_is_whole_and_needs_nothing_else(report: ExperimentReport) -> None:
     page = report_page(report)
     tags = _Tags()
     tags.feed(page)
@@ -228,7 +234,7 @@ def test_the_page_is_whole_and_needs_nothing_else(report: Report) -> None:
         assert text in page
 
 
-def test_names_from_files_do_not_act_on_the_page(report: Report) -> None:
+def test_names_from_files_do_not_act_on_the_page(report: ExperimentReport) -> None:
     hostile = replace(
         RESULT,
         configuration=HOSTILE,

@@ -42,7 +42,7 @@ from rebt_ros.study.simulator.configuration import (
     parse_config,
 )
 from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, simulate
-from rebt_ros.study.words import one_line
+from rebt_ros.study.subtree_text import one_line
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 SCITOS = SHARED / "data" / "scitos_g5_24.csv"

@@ -25,11 +25,11 @@ from rebt_ros.beyond_the_paper.reductions import (
 from rebt_ros.logic.conditions import deciding
 from rebt_ros.logic.dnf import Dnf, conditions_of
 from rebt_ros.logic.domain import infeasible, spelled_out
-from rebt_ros.logic.factoring import Factored, Parts, factored, named, pulled_out
+from rebt_ros.logic.factoring import Factored, FactoredCodes, factored, named, pulled_out
 from rebt_ros.logic.float_reduction import implied_literals, reduced
 from rebt_ros.logic.intervals import enclosing_literals, intervals_among, with_intervals
+from rebt_ros.logic.literal_codes import Codes, Numbering
 from rebt_ros.logic.minimize import cubes, minimized_cover
-from rebt_ros.logic.numbered import Codes, Numbering
 from rebt_ros.paper.rule_trees import FactoredRule, rule_tree, with_root
 from rebt_ros.paper.rules import Rule
 
@@ -69,7 +69,7 @@ def reduced_tree(
         outside = [cubes(numbering.cover(one), width) for one in spelled]
 
     @cache
-    def condition(rule: int, earlier: frozenset[int]) -> Parts:
+    def condition(rule: int, earlier: frozenset[int]) -> FactoredCodes:
         minimized: Sequence[Codes] = covers[rule]
         if is_minimized:
             later = [one for one in range(len(rules)) if one != rule and one not in earlier]
@@ -101,7 +101,7 @@ def reduced_tree(
     return with_root(root, trees)
 
 
-def size_of(condition: Parts, actions: int, enclosing: Sequence[int] | None) -> int:
+def size_of(condition: FactoredCodes, actions: int, enclosing: Sequence[int] | None) -> int:
     """Nodes of a rule's tree, which is not built to be counted.
 
     Args:
@@ -113,7 +113,7 @@ def size_of(condition: Parts, actions: int, enclosing: Sequence[int] | None) -> 
     return _under_one(children + 1, found + actions + (actions > 1))
 
 
-def _extent(condition: Parts, enclosing: Sequence[int] | None) -> tuple[int, int]:
+def _extent(condition: FactoredCodes, enclosing: Sequence[int] | None) -> tuple[int, int]:
     """The trees of a condition, and the nodes of all of them together."""
     children = len(condition.common)
     if enclosing is not None:

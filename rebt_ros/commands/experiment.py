@@ -9,7 +9,7 @@ from pathlib import Path
 from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.commands.shell import aligned, directory, parse, run
 from rebt_ros.study.experiment import Chosen, run_experiment
-from rebt_ros.study.report import Report, rows_of_table
+from rebt_ros.study.report import ExperimentReport, rows_of_table
 from rebt_ros.study.settings import Settings
 
 
@@ -103,7 +103,7 @@ def _experiment(parsed: argparse.Namespace) -> None:
     print(f"Written to {parsed.out}: index.html, report.json, report.csv.")
 
 
-def _text(report: Report) -> list[str]:
+def _text(report: ExperimentReport) -> list[str]:
     found = report.measured
     done, lost = len(report.results), len(report.lost)
     lines = [f"note: {one.configuration} is lost: {one.reason}" for one in report.lost]

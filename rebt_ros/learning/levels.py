@@ -97,7 +97,7 @@ class CrossValidated:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Level:
+class PruningLevel:
     """A pruning level."""
 
     number: int
@@ -160,7 +160,7 @@ class Levels:
             spread.add(level)
         return tuple(sorted(spread))
 
-    def level(self, number: int) -> Level:
+    def level(self, number: int) -> PruningLevel:
         """Makes the trees of a level."""
         ccp_alpha = float(self.ccp_alphas[number])
         tree = self.evidence.tree_at(ccp_alpha)
@@ -169,7 +169,7 @@ class Levels:
         options = replace(self.evidence.options, attach=())
         asked = options.reductions
         resolved, _ = accept(tree.learned.tree, (), options)
-        return Level(
+        return PruningLevel(
             number,
             ccp_alpha,
             tree.decision_tree.tree,

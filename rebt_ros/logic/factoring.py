@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from rebt_ros.logic.conditions import Literal
 from rebt_ros.logic.dnf import Dnf, conditions_of
-from rebt_ros.logic.numbered import Codes, Cover, Numbering, mask
+from rebt_ros.logic.literal_codes import Codes, Cover, Numbering, mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,30 +54,30 @@ def factor(dnf: Dnf) -> Factored:
     return named(factored(numbering.cover(dnf)), numbering)
 
 
-class Parts(NamedTuple):
+class FactoredCodes(NamedTuple):
     """`Factored` in numbers."""
 
     common: Codes
-    alternatives: tuple[Parts, ...] = ()
+    alternatives: tuple[FactoredCodes, ...] = ()
 
 
-def named(parts: Parts, numbering: Numbering) -> Factored:
+def named(parts: FactoredCodes, numbering: Numbering) -> Factored:
     """What was factored in numbers, in literals."""
     return Factored(
         numbering.literals(parts.common), tuple(named(one, numbering) for one in parts.alternatives)
     )
 
 
-def factored(cover: Cover) -> Parts:
+def factored(cover: Cover) -> FactoredCodes:
     """`factor` in numbers."""
     common, rest = _pulled_out(cover)
-    return Parts(common, tuple(_divided(rest)))
+    return FactoredCodes(common, tuple(_divided(rest)))
 
 
-def pulled_out(cover: Cover) -> Parts:
+def pulled_out(cover: Cover) -> FactoredCodes:
     """`pull_out_common` in numbers."""
     common, rest = _pulled_out(cover)
-    return Parts(common, tuple(map(Parts, rest)))
+    return FactoredCodes(common, tuple(map(FactoredCodes, rest)))
 
 
 def _pulled_out(cover: Cover) -> tuple[Codes, Cover]:
@@ -91,14 +91,14 @@ def _pulled_out(cover: Cover) -> tuple[Codes, Cover]:
     return common, [tuple(code for code in codes if not shared >> code & 1) for codes in cover]
 
 
-def _divided(cover: Cover) -> list[Parts]:
+def _divided(cover: Cover) -> list[FactoredCodes]:
     """An OR of plain conjunctions as an OR of factored ones."""
-    parts: list[Parts] = []
+    parts: list[FactoredCodes] = []
     while cover:
         occurrences = Counter(chain.from_iterable(cover))
         divisor = max(occurrences, key=occurrences.__getitem__, default=None)
         if divisor is None or occurrences[divisor] < 2:
-            return [*parts, *map(Parts, cover)]
+            return [*parts, *map(FactoredCodes, cover)]
         parts.append(factored([codes for codes in cover if divisor in codes]))
         cover = [codes for codes in cover if divisor not in codes]
     return parts

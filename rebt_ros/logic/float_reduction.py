@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 from rebt_ros.logic.conditions import Condition, Quantity, Threshold
 from rebt_ros.logic.dnf import Dnf, conditions_of
-from rebt_ros.logic.numbered import Codes, Numbering, mask
+from rebt_ros.logic.literal_codes import Codes, Numbering, mask
 
 
 def float_reduction(dnf: Dnf) -> Dnf:

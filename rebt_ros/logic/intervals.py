@@ -11,7 +11,7 @@ from itertools import permutations
 
 from rebt_ros.logic.conditions import KNOWN, Condition, Interval, Literal, Quantity, Threshold
 from rebt_ros.logic.factoring import Factored
-from rebt_ros.logic.numbered import Codes, mask
+from rebt_ros.logic.literal_codes import Codes, mask
 
 
 def with_intervals(condition: Factored) -> Factored:

@@ -15,7 +15,7 @@ from typing import TypeAlias
 from pyeda.boolalg.espresso import DTYPE, FTYPE, RTYPE, espresso
 
 from rebt_ros.logic.dnf import FALSE, Dnf, conditions_of
-from rebt_ros.logic.numbered import Codes, Cover, Numbering
+from rebt_ros.logic.literal_codes import Codes, Cover, Numbering
 
 #: Positional cube notation: what espresso calls the value of one input.
 _NEGATIVE, _POSITIVE, _ABSENT = 1, 2, 3

@@ -26,7 +26,7 @@ from rebt_ros.drawing.errors import PictureError
 from rebt_ros.drawing.svg import render_svg
 from rebt_ros.drawing.tree_png import render_decision_tree_png, render_png
 from rebt_ros.learning.learning import Learning
-from rebt_ros.learning.levels import Level, Levels
+from rebt_ros.learning.levels import Levels, PruningLevel
 from rebt_ros.learning.progress import Progress
 from rebt_ros.storage.atomic import write_bytes_atomically, write_text_atomically
 from rebt_ros.storage.tree_file import write_tree
@@ -157,7 +157,7 @@ def _remove_if_empty(directory: Path) -> None:
         directory.rmdir()
 
 
-def _entry(name: str, level: Level) -> dict[str, Any]:
+def _entry(name: str, level: PruningLevel) -> dict[str, Any]:
     tree, figures = level.learned.tree, level.learned.provenance.figures
     judged = level.cross_validated
     return {

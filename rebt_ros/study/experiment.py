@@ -18,7 +18,7 @@ from rebt_ros.study.configurations import (
 )
 from rebt_ros.study.figures import usable
 from rebt_ros.study.page import report_page
-from rebt_ros.study.report import Report, report_csv, report_json, report_of
+from rebt_ros.study.report import ExperimentReport, report_csv, report_json, report_of
 from rebt_ros.study.result_files import ResultFiles
 from rebt_ros.study.running import attempt
 from rebt_ros.study.settings import Settings
@@ -44,7 +44,7 @@ def run_experiment(
     jobs: int = -1,
     scheduler: str | None = None,
     progress: Progress = lambda stage, share: None,
-) -> Report:
+) -> ExperimentReport:
     """Runs what has not been run and writes report.json, report.csv and index.html.
 
     Args:

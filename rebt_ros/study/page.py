@@ -11,7 +11,7 @@ from rebt_ros.study.bars import BarChart, bar_chart_svg, histogram
 from rebt_ros.study.figures import Difference, Loss, differences, reductions
 from rebt_ros.study.mode import Mode
 from rebt_ros.study.provenance import provenance
-from rebt_ros.study.report import Report, rows_of_table
+from rebt_ros.study.report import ExperimentReport, rows_of_table
 
 #: Width of a group in the plot of reductions, in per cent.
 _REDUCTION_STEP = 5
@@ -38,7 +38,7 @@ svg { width: 100%; max-width: 760px; height: auto; display: block; margin: 0.8re
 """
 
 
-def report_page(report: Report) -> str:
+def report_page(report: ExperimentReport) -> str:
     """The page as HTML; everything that was read is escaped."""
     body = "\n".join(
         [*_summary(report), *_plots(report), *_losses(report), *_lost(report), *_method(report)]
@@ -51,7 +51,7 @@ def report_page(report: Report) -> str:
     )
 
 
-def _summary(report: Report) -> Iterator[str]:
+def _summary(report: ExperimentReport) -> Iterator[str]:
     rows = sum(result.rows for result in report.results)
     levels = sum(result.levels for result in report.results)
     yield "<h1>RE:BT-Espresso: simulated trees, learned back</h1>"
@@ -69,7 +69,7 @@ def _summary(report: Report) -> Iterator[str]:
     )
 
 
-def _plots(report: Report) -> Iterator[str]:
+def _plots(report: ExperimentReport) -> Iterator[str]:
     ours = (Mode.PAPER, Mode.DEFAULT)
     yield "<h2>Distance saved against BT-Espresso (as Fig. 4 of the paper)</h2>"
     for mode in ours:
@@ -118,7 +118,7 @@ def _statistics(apart: Sequence[Difference]) -> list[tuple[str, list[float]]]:
     ]
 
 
-def _losses(report: Report) -> Iterator[str]:
+def _losses(report: ExperimentReport) -> Iterator[str]:
     yield "<h2>Losses</h2>"
     listed = [(mode, loss) for mode, figures in report.figures.items() for loss in figures.losses]
     if not listed:
@@ -145,7 +145,7 @@ def _loss_row(mode: Mode, loss: Loss) -> tuple[str, ...]:
     )
 
 
-def _lost(report: Report) -> Iterator[str]:
+def _lost(report: ExperimentReport) -> Iterator[str]:
     yield "<h2>Lost configurations</h2>"
     if not report.lost:
         yield _paragraph("There are none.")
@@ -156,7 +156,7 @@ def _lost(report: Report) -> Iterator[str]:
     )
 
 
-def _method(report: Report) -> Iterator[str]:
+def _method(report: ExperimentReport) -> Iterator[str]:
     found = report.measured
     yield "<h2>Measure, settings, versions</h2>"
     yield _paragraph(

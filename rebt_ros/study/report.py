@@ -28,7 +28,7 @@ from rebt_ros.study.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class ExperimentReport:
     """What is reported."""
 
     settings: Settings
@@ -46,13 +46,13 @@ def report_of(
     results: tuple[ConfigurationResult, ...],
     lost: tuple[Lost, ...],
     seconds: float,
-) -> Report:
-    """The report of some results; see `Report`."""
+) -> ExperimentReport:
+    """The report of some results; see `ExperimentReport`."""
     figures = {mode: mode_figures(results, mode) for mode in Mode}
-    return Report(settings, results, lost, figures, measured(results), seconds)
+    return ExperimentReport(settings, results, lost, figures, measured(results), seconds)
 
 
-def report_json(report: Report) -> str:
+def report_json(report: ExperimentReport) -> str:
     """The figures as JSON."""
     value = {
         "modes": {mode.value: _mode(one) for mode, one in report.figures.items()},
@@ -163,7 +163,7 @@ _COLUMNS = (
 )
 
 
-def report_csv(report: Report) -> str:
+def report_csv(report: ExperimentReport) -> str:
     """A line for each simulated subtree and mode."""
     file = io.StringIO()
     writer = csv.DictWriter(file, _COLUMNS, lineterminator="\n")
@@ -213,7 +213,7 @@ def _outcome(distance: float, baseline: float) -> str:
     return "win" if distance < baseline else "loss"
 
 
-def rows_of_table(report: Report) -> list[tuple[str, ...]]:
+def rows_of_table(report: ExperimentReport) -> list[tuple[str, ...]]:
     """The paper's figures beside ours, with a heading, for a person to read."""
     columns = [_column(one) for one in report.figures.values()]
     theirs = _published_column()

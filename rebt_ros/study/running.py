@@ -42,7 +42,7 @@ from rebt_ros.study.scores import ComparedTree, Distances, comparable, score
 from rebt_ros.study.settings import MAX_DEPTH, Settings
 from rebt_ros.study.simulator.configuration import ExperimentConfig, as_behavior_tree
 from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, published_variables, simulate
-from rebt_ros.study.words import one_line
+from rebt_ros.study.subtree_text import one_line
 
 
 @dataclass(frozen=True, slots=True)

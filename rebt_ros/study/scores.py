@@ -20,7 +20,7 @@ from rebt_ros.study.edit_distance.bounds import Bounds, distance_bounds
 from rebt_ros.study.edit_distance.canonical import canonical
 from rebt_ros.study.edit_distance.labelled_tree import LabelledTree, labelled
 from rebt_ros.study.results import Score
-from rebt_ros.study.words import one_line
+from rebt_ros.study.subtree_text import one_line
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ LONGEST_WORD = 9
 _LEAST_SHARE = 0.001
 
 
-class Level(NamedTuple):
+class TrieLevel(NamedTuple):
     """The beginnings of words that have one length."""
 
     parent: IntArray
@@ -40,7 +40,7 @@ class Corpus:
     """The most frequent words."""
 
     actions: int
-    levels: tuple[Level, ...]
+    levels: tuple[TrieLevel, ...]
     moments: float
     """How many moments have these words."""
     rows: float
@@ -79,7 +79,7 @@ def corpus(moments: Moments) -> Corpus:
     )
 
 
-def _levels(read: dict[Word, list[float]], share: FloatArray) -> list[Level]:
+def _levels(read: dict[Word, list[float]], share: FloatArray) -> list[TrieLevel]:
     levels = []
     before: dict[Word, int] = {(): 0}
     for length in range(1, max(map(len, read)) + 1):
@@ -90,7 +90,7 @@ def _levels(read: dict[Word, list[float]], share: FloatArray) -> list[Level]:
         children = np.zeros((len(before), len(here)), np.float32)
         children[parent, np.arange(len(here))] = 1
         levels.append(
-            Level(
+            TrieLevel(
                 parent, action, ends[:, 0], ends[:, 1], share[action].astype(np.float32), children
             )
         )

@@ -21,9 +21,9 @@ from rebt_ros.study.edit_distance.canonical import (
     Integers,
     canonical,
 )
+from rebt_ros.study.edit_distance.integer_program import TOLERANCE, solve
 from rebt_ros.study.edit_distance.labelled_tree import LabelledTree
 from rebt_ros.study.edit_distance.pair import Pair, Swaps
-from rebt_ros.study.edit_distance.program import TOLERANCE, solve
 from rebt_ros.study.edit_distance.relaxation import ROUNDING, Relaxation
 
 #: Assignment problems per pair.

@@ -5,7 +5,7 @@ child's image, and the rest to the parent's.  A node's image then scores its lab
 child, and as a parent the best that its children could have with those of the image, whatever
 their own images are.  The best assignment of nodes to images cannot score less than the best
 mapping, whatever the shares.  A subgradient method moves the shares to where the bound is lowest:
-a Lagrangian relaxation of the integer program in `rebt_ros.study.edit_distance.program`.
+a Lagrangian relaxation of the integer program in `rebt_ros.study.edit_distance.integer_program`.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from rebt_ros.logic.dnf import Dnf, conditions_of
 from rebt_ros.logic.factoring import factored, named, pulled_out
 from rebt_ros.logic.float_reduction import implied_literals, reduced
 from rebt_ros.logic.intervals import enclosing_literals, with_intervals
-from rebt_ros.logic.numbered import Numbering, mask
+from rebt_ros.logic.literal_codes import Numbering, mask
 from rebt_ros.paper.re_bt_espresso import rule_tree
 from rebt_ros.paper.rule_trees import FactoredRule
 
