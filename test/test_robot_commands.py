@@ -126,6 +126,31 @@ def test_a_service_is_called_and_its_failure_is_told(
         assert executor.stop() == 0
 
 
+def test_a_person_with_a_joystick_takes_over_while_it_is_used(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    (tmp_path / "tree.json").write_text(_document(tmp_path, "beep", "go"))
+    joystick = "actions: {action: {joy: /joy, axes: {1: {0.5: go, -0.5: back}}}}"
+    text = f"state: {{x: /odom.pose.pose.position.x}}\n{joystick}\n{COMMANDS}"
+    (tmp_path / "joy.yaml").write_text(text)
+    with _executor(domain, tmp_path, robot_file="joy.yaml", takeover_timeout=0.5) as executor:
+
+        def condition(axis: float, wanted: str) -> Callable[[], bool]:
+            def look() -> bool:
+                peer.publish(some.scan(4.0), "/scan")
+                peer.publish(some.joy(axis=axis), "/joy")
+                status = peer.diagnostics.get("executor: execution")
+                return status is not None and wanted in status.message
+
+            return look
+
+        # A joystick that lies on the table is nobody who drives.
+        peer.wait_until(condition(0.0, "running"), what="the tree to drive")
+        peer.wait_until(condition(-1.0, "paused: a person has taken over"), what="a takeover")
+        peer.wait_until(condition(0.0, "running"), what="the tree to drive again")
+        assert executor.stop() == 0
+
+
 def test_a_label_without_a_command_is_told(domain: int, peer: Peer, tmp_path: Path) -> None:
     (tmp_path / "tree.json").write_text(_document(tmp_path, "dance", "go"))
 

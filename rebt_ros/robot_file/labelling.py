@@ -35,6 +35,8 @@ class Labeller(Protocol):
 
     wanted: tuple[Attributes, ...]
     """The attributes of messages that are read, each with all that is in it."""
+    acts: bool
+    """Whether somebody does something, by the latest message."""
 
     def labels(self, message: Any, stamp: int) -> Sequence[str]:
         """What a message says that is done from now on; empty labels for nothing any longer.
@@ -106,6 +108,7 @@ class PathLabeller:
         self.wanted = wanted_of(path)
         self._get = getter(path)
         self._labels = source.labels
+        self.acts = False
         self._text = _written(path.kind, path.names)
         self._changes = _Changes(source.emit)
 
@@ -113,9 +116,9 @@ class PathLabeller:
         """See `Labeller`."""
         value = self._get(message, stamp)
         text, name = ("", "") if value is None else self._text(value)
-        if not self._labels:
-            return self._changes.of(name)
-        return self._changes.of(self._labels.get(text, self._labels.get(name, "")))
+        label = self._labels.get(text, self._labels.get(name, "")) if self._labels else name
+        self.acts = bool(label)
+        return self._changes.of(label)
 
 
 def _written(kind: Primitive, names: Mapping[int, str]) -> Callable[[Value], tuple[str, str]]:
@@ -143,6 +146,7 @@ class JoyLabeller:
     def __init__(self, source: JoyActions) -> None:
         self.wanted: tuple[Attributes, ...] = (("buttons",), ("axes",))
         self._source = source
+        self.acts = False
         self._down: set[int] = set()
         self._held = ""
 
@@ -154,6 +158,7 @@ class JoyLabeller:
         self._down = down
         held = next((label for one, label in source.hold.items() if one in down), "")
         held = held or self._axis(message.axes)
+        self.acts = bool(held or pressed)
         changed = [held] if held != self._held else []
         self._held = held
         # What is pressed lasts until something else is done.
@@ -194,6 +199,7 @@ class TwistLabeller:
         self._source = source
         self._stamped = stamped
         self._now = ""
+        self.acts = False
         self._changes = _Changes(source.emit)
 
     def labels(self, message: Any, stamp: int) -> Sequence[str]:
@@ -202,6 +208,7 @@ class TwistLabeller:
         x, z = twist.linear.x / self._source.linear, twist.angular.z / self._source.angular
         if math.isfinite(x) and math.isfinite(z):
             self._now = self._label(math.hypot(x, z), math.degrees(math.atan2(z, x)))
+        self.acts = self._now not in ("", self._source.rest)
         return self._changes.of(self._now)
 
     def _label(self, speed: float, direction: float) -> str:
@@ -236,6 +243,7 @@ class LogLabeller:
     def __init__(self, source: BehaviorTreeLogActions) -> None:
         self.wanted: tuple[Attributes, ...] = (("event_log",),)
         self._labels = source.labels
+        self.acts = False
         self._running: dict[str, str] = {}
         self._changes = _Changes(Emit.CHANGE)
 
@@ -249,5 +257,6 @@ class LogLabeller:
             self._running.pop(event.node_name, None)
             if event.current_status == "RUNNING":
                 self._running[event.node_name] = label
+        self.acts = bool(self._running)
         said += self._changes.of(next(reversed(self._running.values()), ""))
         return said

@@ -6,6 +6,7 @@ import gc
 import json
 import sys
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
@@ -30,6 +31,7 @@ from rebt_ros.live.last_tick import LastTick, last_tick
 from rebt_ros.live.novelty_guard import NoveltyGuard
 from rebt_ros.live.takeover import Takeover, channel_of
 from rebt_ros.live.tree_inputs import Message
+from rebt_ros.robot_file.binding import BoundTopic
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.command_channels import DRIVING_QOS, CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
@@ -38,6 +40,7 @@ from rebt_ros.ros.executor.robot_inputs import RobotInputs
 from rebt_ros.ros.executor.settings import declare_settings
 from rebt_ros.ros.executor.tree_program import Preparation, TreeProgram
 from rebt_ros.ros.graph_watch import Finding, GraphWatch
+from rebt_ros.ros.robot_files import RobotTopics
 from rebt_ros.ros.topic_names import check_topics
 from rebt_ros.storage.tree_file import read_tree
 
@@ -48,6 +51,9 @@ _STATE_QOS: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFOR
 
 #: Least time between two snapshots (seconds).
 _SNAPSHOT_PERIOD: Final = 0.2
+
+#: Messages of a person that may wait.
+_PERSON_DEPTH: Final = 10
 
 #: Time between two looks at what topics carry (seconds).
 _LOOK_PERIOD: Final = 0.5
@@ -131,6 +137,7 @@ class ExecutorNode(Node):
         self._documents = self.create_subscription(
             String, self._trees, self._on_document, _TREE_QOS
         )
+        self._persons = self._listen_to_persons()
         for topic in self._settings.takeover.topics:
             self.create_subscription(String, topic, partial(self._on_person, topic), 10)
         if self._settings.tree_file is not None:
@@ -289,6 +296,8 @@ class ExecutorNode(Node):
     def _look_at_publishers(self) -> None:
         for robot in self._robots.values():
             robot.look()
+        if self._persons is not None:
+            self._persons.look()
 
     def _on_state(self, topic: str, message: Float64MultiArray) -> None:
         # A message may still come on a topic that no tree reads any longer.
@@ -326,6 +335,36 @@ class ExecutorNode(Node):
         # Where commands were remapped to that topic, they are not a person's.
         if self.resolve_topic_name(topic) in self._channels.topics:
             return
+        self._take_over(topic)
+        channels = self._program.channels if self._program else [topic]
+        channel = channel_of(topic, channels, self._settings.takeover.topics)
+        if message.data and channel is not None:
+            self._histories.setdefault(channel, ActionHistory()).take(message.data)
+
+    def _listen_to_persons(self) -> RobotTopics | None:
+        """Subscribes to what the robot file says that a person does."""
+        robot, commands = self._settings.robot, self._robot_commands
+        if robot is None or commands is None or not self._settings.takeover.timeout:
+            return None
+        # What is commanded there is not a person's, and the others are listened to already.
+        others = commands.topics | {
+            self.resolve_topic_name(one) for one in self._settings.takeover.topics
+        }
+        topics = (one for one in robot.action_topics if self.resolve_topic_name(one) not in others)
+        return RobotTopics(self, robot, tuple(topics), _PERSON_DEPTH, self._person_callback)
+
+    def _person_callback(self, bound: BoundTopic) -> Callable[..., None]:
+        def take(message: Any) -> None:
+            for channel, labeller in bound.labellers.items():
+                labels = labeller.labels(message, time.time_ns())
+                if labeller.acts:
+                    self._take_over(bound.name)
+                for label in filter(None, labels):
+                    self._histories.setdefault(channel, ActionHistory()).take(label)
+
+        return take
+
+    def _take_over(self, topic: str) -> None:
         if self._takeover.note(self._now()) and self._enabled and self._program is not None:
             self.get_logger().info(f"a person has taken over on {topic}.")
             self._interrupt()
@@ -333,10 +372,6 @@ class ExecutorNode(Node):
             self._guard.release()
         self._moving = self._enabled and self._program is not None
         self._say_who_drives()
-        channels = self._program.channels if self._program else [topic]
-        channel = channel_of(topic, channels, self._settings.takeover.topics)
-        if message.data and channel is not None:
-            self._histories.setdefault(channel, ActionHistory()).take(message.data)
 
     def _on_clock_set_back(self, _: TimeJump) -> None:
         """What was received then is not from now: all topics are stale until they send again."""

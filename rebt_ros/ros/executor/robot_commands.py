@@ -65,6 +65,11 @@ class RobotCommands:
         known = {*self._each_tick, *self._once, *self._long}
         return [label for label in labels if label not in known]
 
+    @property
+    def topics(self) -> frozenset[str]:
+        """The full names of the topics on which messages are published."""
+        return frozenset(str(one.topic_name) for one in self._publishers.values())
+
     def begin_tick(self) -> None:
         """Must be called before each tick of the tree."""
         for one in self._long.values():
