@@ -138,17 +138,19 @@ def _encode(learned: LearnedTree) -> Json:
         **({} if robot is None else {"robot": robot.content}),
         "row_kind": learned.row_kind.value,
         "features": [_encode_feature(feature) for feature in learned.features],
-        "actions": [{"label": one.label, "channel": one.channel} for one in learned.actions],
+        "actions": [
+            {"label": action.label, "channel": action.channel} for action in learned.actions
+        ],
         "tree": _encode_node(learned.tree),
         "suggestions": [
             {
-                "id": one.id,
-                "kind": one.kind.value,
-                "support": one.support,
-                "attached": one.attached,
-                "tree": _encode_node(one.subtree),
+                "id": suggestion.id,
+                "kind": suggestion.kind.value,
+                "support": suggestion.support,
+                "attached": suggestion.attached,
+                "tree": _encode_node(suggestion.subtree),
             }
-            for one in learned.suggestions
+            for suggestion in learned.suggestions
         ],
         "provenance": _encode_provenance(learned.provenance),
         "shown": [
@@ -186,13 +188,13 @@ def _encode_provenance(provenance: Provenance) -> Json:
     if provenance.channels:
         encoded["channels"] = [
             {
-                "channel": one.channel,
-                "rows": one.rows,
-                "ccp_alpha": one.ccp_alpha,
-                "history": one.history.value,
-                "figures": _encode_figures(one.figures),
+                "channel": channel.channel,
+                "rows": channel.rows,
+                "ccp_alpha": channel.ccp_alpha,
+                "history": channel.history.value,
+                "figures": _encode_figures(channel.figures),
             }
-            for one in provenance.channels
+            for channel in provenance.channels
         ]
     return encoded
 

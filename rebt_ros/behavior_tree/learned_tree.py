@@ -65,7 +65,9 @@ class Suggestion:
         """In how many rows it was shown at least: each time, each of its actions took a row."""
         if self.kind.unit is Unit.ROW:
             return self.support
-        return self.support * sum(isinstance(one, nodes.Action) for one in nodes.walk(self.subtree))
+        return self.support * sum(
+            isinstance(node, nodes.Action) for node in nodes.walk(self.subtree)
+        )
 
 
 class Root(Enum):
@@ -154,7 +156,7 @@ class LearnedTree:
         # Documents come from outside, so looking up must not take long however much they declare.
         actions = frozenset(self.actions)
         labels = {action.label for action in actions}
-        categories = {one.name: frozenset(one.categories) for one in self.features}
+        categories = {feature.name: frozenset(feature.categories) for feature in self.features}
         if len(categories) != len(self.features):
             yield "two features have the same name"
         for tree in (self.tree, *(suggestion.subtree for suggestion in self.suggestions)):

@@ -189,9 +189,9 @@ def features(node: Node) -> frozenset[str]:
     """The names of the features that the tree tests."""
     return frozenset(
         name
-        for one in conditions(node)
-        if not isinstance(one.literal.condition, PreviousActionIs | LastActionIs)
-        for name in features_of(one.literal.condition)
+        for condition in conditions(node)
+        if not isinstance(condition.literal.condition, PreviousActionIs | LastActionIs)
+        for name in features_of(condition.literal.condition)
     )
 
 
@@ -203,6 +203,10 @@ def policies(node: Node) -> dict[str, Node]:
     """
     if isinstance(node, Parallel):
         channels = [{action.channel for action in actions(child)} for child in node.children]
-        if all(len(one) == 1 for one in channels) and len(set.union(*channels)) == len(channels):
-            return {one.pop(): child for one, child in zip(channels, node.children, strict=True)}
+        if all(len(channel) == 1 for channel in channels) and len(set.union(*channels)) == len(
+            channels
+        ):
+            return {
+                channel.pop(): child for channel, child in zip(channels, node.children, strict=True)
+            }
     return {action.channel: node for action in actions(node)[:1]}

@@ -178,7 +178,7 @@ def _allowed(values: object, categories: Sequence[str]) -> list[bool]:
     """Which codes a leaf has; the last one stands for all categories that are unknown."""
     if not isinstance(values, tuple):
         return [True] * (len(categories) + 1)
-    return [*(one in values for one in categories), False]
+    return [*(category in values for category in categories), False]
 
 
 def _spread(low: FloatArray, high: FloatArray) -> FloatArray:

@@ -147,7 +147,9 @@ class Plan:
     def choose(self, actions: tuple[nodes.Action, ...], states: States) -> IntArray:
         """As the function of this name."""
         chosen = np.full(len(states), NO_ACTION, dtype=np.int64)
-        code = [actions.index(one) if one in actions else NO_ACTION for one in self.actions]
+        code = [
+            actions.index(action) if action in actions else NO_ACTION for action in self.actions
+        ]
         for rows, part in self._parts(states):
             for number, mask in zip(code, self._commands(part), strict=True):
                 np.putmask(chosen[rows], _unpacked(mask, part.rows), number)

@@ -416,8 +416,8 @@ class StateEncoder:
         self._past: deque[list[float]] = deque(maxlen=max(self._lags, default=0))
         self.topics: dict[str, int] = {}
         """The least number of values that each topic must send."""
-        for one in self._sources:
-            self.topics[one.topic] = max(self.topics.get(one.topic, 0), one.index + 1)
+        for source in self._sources:
+            self.topics[source.topic] = max(self.topics.get(source.topic, 0), source.index + 1)
 
     def encode(self, latest: Mapping[str, Sequence[float]]) -> list[float]:
         """The values of all features; NaN for a category that was never shown.
@@ -429,7 +429,7 @@ class StateEncoder:
             latest: The newest message of every topic in `topics`, of at least that length.
         """
         # Of a lagged feature, what its source holds now.
-        present = [latest[one.topic][one.index] for one in self._sources]
+        present = [latest[source.topic][source.index] for source in self._sources]
         for place, codes in self._codes.items():
             present[place] = codes.get(present[place], math.nan)
         state = [self._at(lag, place, present) for place, lag in enumerate(self._lags)]

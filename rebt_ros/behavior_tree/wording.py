@@ -77,7 +77,7 @@ class Wording:
             one.subtree for one in suggestions if one.kind is SuggestionKind.LAT_SEQUENCE
         ]
         self._lat_sequences = frozenset(map(_as_suggested, lat_sequences))
-        self._lat_lengths = frozenset(len(nodes.children(one)) for one in lat_sequences)
+        self._lat_lengths = frozenset(len(nodes.children(sequence)) for sequence in lat_sequences)
         thresholds: dict[Quantity, list[float]] = {}
         deciding: dict[str, set[tuple[str, ...]]] = {}
         for tree in trees:

@@ -60,7 +60,7 @@ def reduced_tree(
     covers = [numbering.cover(rule.dnf) for rule in rules]
     is_minimized = leaves <= MOST_LEAVES_MINIMIZED
     width = len(numbering.conditions)
-    inside = [cubes(one, width) for one in covers] if is_minimized else []
+    inside = [cubes(cover, width) for cover in covers] if is_minimized else []
     impossible = cubes((), width)
     outside = inside
     if reductions.made_in(leaves).domain:
@@ -120,7 +120,9 @@ def _extent(condition: FactoredCodes, enclosing: Sequence[int] | None) -> tuple[
         children -= intervals_among(condition.common, enclosing)
     if not condition.alternatives:
         return children, children
-    below = sum(_under_one(*_extent(one, enclosing)) for one in condition.alternatives)
+    below = sum(
+        _under_one(*_extent(alternative, enclosing)) for alternative in condition.alternatives
+    )
     return children + 1, children + 1 + below
 
 
@@ -186,5 +188,5 @@ def _meant_by(actions: tuple[str, ...], condition: Factored) -> Factored:
     """The condition as it is meant in a rule for these actions."""
     return Factored(
         tuple(deciding(literal, actions) for literal in condition.common),
-        tuple(_meant_by(actions, one) for one in condition.alternatives),
+        tuple(_meant_by(actions, alternative) for alternative in condition.alternatives),
     )

@@ -117,11 +117,15 @@ def _noticeable(findings: Findings, wording: Wording, most: int) -> Iterator[str
 def _divergences(comparison: Comparison, most: int) -> Iterator[str]:
     if not comparison.divergences:
         yield "both do the same in every state."
-    for one in comparison.divergences:
-        what = f"{action_text(one.mine)} instead of {action_text(one.other)}"
-        yield from regions(what, one.boxes, comparison.grid, most)
-        if one.rows is not None:
-            rows = "1 row that was shown lies" if one.rows == 1 else f"{one.rows} rows shown lie"
+    for divergence in comparison.divergences:
+        what = f"{action_text(divergence.mine)} instead of {action_text(divergence.other)}"
+        yield from regions(what, divergence.boxes, comparison.grid, most)
+        if divergence.rows is not None:
+            rows = (
+                "1 row that was shown lies"
+                if divergence.rows == 1
+                else f"{divergence.rows} rows shown lie"
+            )
             yield f"    {rows} there"
 
 

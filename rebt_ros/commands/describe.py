@@ -48,7 +48,7 @@ def _describe(parsed: argparse.Namespace) -> None:
     surveys, notes = _surveyed(parsed)
     for note in notes:
         print(f"note: {note}.")
-    if not any(one.messages for one in surveys):
+    if not any(survey.messages for survey in surveys):
         raise InputError("there are no messages whose types are known.")
     print("\n".join(aligned(tuple(_table(surveys)))))
     if out is None:
@@ -76,13 +76,13 @@ def _surveyed(parsed: argparse.Namespace) -> tuple[tuple[TopicSurvey, ...], tupl
 
 
 def _table(surveys: Sequence[TopicSurvey]) -> Iterator[tuple[str, str, str]]:
-    for one in surveys:
-        rate = f"{one.rate:.3g} Hz" if one.rate else "once" if one.messages == 1 else ""
-        counted = f"{one.messages} messages" if one.messages else "no messages"
-        yield one.topic, one.kind, f"{counted}, {rate}".rstrip(", ")
-        for field in one.fields:
+    for survey in surveys:
+        rate = f"{survey.rate:.3g} Hz" if survey.rate else "once" if survey.messages == 1 else ""
+        counted = f"{survey.messages} messages" if survey.messages else "no messages"
+        yield survey.topic, survey.kind, f"{counted}, {rate}".rstrip(", ")
+        for field in survey.fields:
             if field.seen:
-                path = str(field.path).removeprefix(one.topic)
+                path = str(field.path).removeprefix(survey.topic)
                 yield f"  {'*' if field.varies else ' '} {path}", "", field.in_words()
 
 

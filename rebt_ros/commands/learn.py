@@ -362,7 +362,9 @@ def _options(parsed: argparse.Namespace) -> LearnOptions:
         for name in _ASKED
         if getattr(parsed, name) is not None
     }
-    reductions = Reductions(**{one.name: getattr(parsed, one.name) for one in fields(Reductions)})
+    reductions = Reductions(
+        **{field.name: getattr(parsed, field.name) for field in fields(Reductions)}
+    )
     return replace(
         LearnOptions.paper() if parsed.paper else LearnOptions(reductions=reductions),
         **asked,
@@ -439,11 +441,11 @@ def _declared(parsed: argparse.Namespace) -> dict[str, FeatureKind]:
 
 def _suggestions(learned: LearnedTree) -> Iterator[str]:
     yield "Suggested subtrees (attach with --attach ID):"
-    width = max(len(one.id) for one in learned.suggestions)
-    for one in learned.suggestions:
-        shown = " → ".join(action.label for action in nodes.actions(one.subtree))
-        mark = ", attached" if one.attached else ""
-        yield f"  {one.id:<{width}}  {shown}  (shown {how_often(one)}{mark})"
+    width = max(len(suggestion.id) for suggestion in learned.suggestions)
+    for suggestion in learned.suggestions:
+        shown = " → ".join(action.label for action in nodes.actions(suggestion.subtree))
+        mark = ", attached" if suggestion.attached else ""
+        yield f"  {suggestion.id:<{width}}  {shown}  (shown {how_often(suggestion)}{mark})"
 
 
 def _judgement(result: OfflineLearning) -> str:

@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> None:
 def _suggest(parsed: argparse.Namespace) -> None:
     paths = tuple(map(Path, parsed.inputs))
     tables = tabulate(load(paths, input_options(parsed)).demonstrations)
-    rules = [one for table in tables for one in suggested_rules(table, max(parsed.most, 0))]
+    rules = [rule for table in tables for rule in suggested_rules(table, max(parsed.most, 0))]
     print("\n".join(_lines(rules, several=len(tables) > 1)))
 
 
@@ -45,14 +45,14 @@ def _lines(rules: Sequence[SuggestedRule], *, several: bool) -> Iterator[str]:
         yield "rules: []"
         return
     yield "rules:"
-    for one in rules:
-        margin = f", by {one.margin:.1%} of its values" if one.margin else ""
-        rows = f"{one.support} of {one.rows} rows"
+    for rule in rules:
+        margin = f", by {rule.margin:.1%} of its values" if rule.margin else ""
+        rows = f"{rule.support} of {rule.rows} rows"
         yield f"  # Never shown in {rows}, which have other actions{margin}."
-        yield f"  - never: {_scalar(one.action)}"
+        yield f"  - never: {_scalar(rule.action)}"
         if several:
-            yield f"    channel: {_scalar(one.channel)}"
-        yield f"    when: {_scalar(one.when)}"
+            yield f"    channel: {_scalar(rule.channel)}"
+        yield f"    when: {_scalar(rule.when)}"
 
 
 def _scalar(text: str) -> str:

@@ -160,7 +160,7 @@ class _Command:
         self._of_ros = of_ros
         self._settings = _settings(parsed)
         self._candidates, self._notes = distinct(_candidates(parsed))
-        self._trial = Trial([one.nodes for one in self._candidates], parsed.episodes)
+        self._trial = Trial([candidate.nodes for candidate in self._candidates], parsed.episodes)
         self._episodes: list[list[Episode]] = [[] for _ in self._candidates]
         self._progress = ProgressBar()
 

@@ -79,7 +79,9 @@ def columns(table: DemonstrationTable, vocabulary: Vocabulary) -> tuple[Number |
         elif feature.kind is FeatureKind.BINARY:
             asked.append(Indicator(IsTrue(feature.name)))
         else:
-            asked += [Indicator(HasCategory(feature.name, one)) for one in feature.categories]
+            asked += [
+                Indicator(HasCategory(feature.name, category)) for category in feature.categories
+            ]
     asked += map(Number, vocabulary.differences)
     match vocabulary.history:
         case History.PREVIOUS:

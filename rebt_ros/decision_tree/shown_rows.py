@@ -74,7 +74,7 @@ def _values(
         return [None] * len(starts)
     ordered = column[order]
     if feature.kind is FeatureKind.CATEGORICAL:
-        return [_categories(feature, one) for one in np.split(ordered, starts[1:])]
+        return [_categories(feature, part) for part in np.split(ordered, starts[1:])]
     # These leave out what is missing, unless all is.
     low, high = np.fmin.reduceat(ordered, starts), np.fmax.reduceat(ordered, starts)
     return [

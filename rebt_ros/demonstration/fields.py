@@ -56,8 +56,8 @@ def fields_of(dimensions: Sequence[Dimension], count: int) -> tuple[str, ...]:
     """
     if len(dimensions) == 1:
         names = [dimensions[0].label] if count == 1 else dimensions[0].label.split(",")
-    elif len(dimensions) == count and all(one.size <= 1 for one in dimensions):
-        names = [one.label for one in dimensions]
+    elif len(dimensions) == count and all(dimension.size <= 1 for dimension in dimensions):
+        names = [dimension.label for dimension in dimensions]
     else:
         return ()
     fields = tuple(name.strip() for name in names)

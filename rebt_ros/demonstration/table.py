@@ -149,14 +149,16 @@ def tabulate(
         InputError: No rows, or demonstrations whose features or kinds of rows differ.
         OptionError: A declared feature does not exist or does not hold such values.
     """
-    demonstrations = [one for one in demonstrations if len(one)]
+    demonstrations = [demonstration for demonstration in demonstrations if len(demonstration)]
     if not demonstrations:
         raise InputError(
             "there are no demonstration rows: record actions together with states first."
         )
     features, states = _joined_states(demonstrations)
     features, states = _with_kinds(features, states, declared or {})
-    channels = sorted({channel for one in demonstrations for channel in one.channels})
+    channels = sorted(
+        {channel for demonstration in demonstrations for channel in demonstration.channels}
+    )
     row_kind = _common_row_kind(demonstrations)
     return tuple(
         replace(_channel_table(channel, demonstrations, features, states), row_kind=row_kind)
@@ -182,9 +184,13 @@ def _channel_table(
     features: tuple[Feature, ...],
     states: FloatArray,
 ) -> DemonstrationTable:
-    rows = [_rows_of(channel, one) for one in demonstrations]
-    codes = [one.chosen[its] for one, its in zip(demonstrations, rows, strict=True)]
-    actions, chosen = _joined_labels([one.actions for one in demonstrations], codes)
+    rows = [_rows_of(channel, demonstration) for demonstration in demonstrations]
+    codes = [
+        demonstration.chosen[its] for demonstration, its in zip(demonstrations, rows, strict=True)
+    ]
+    actions, chosen = _joined_labels(
+        [demonstration.actions for demonstration in demonstrations], codes
+    )
     everywhere = np.concatenate(rows)
     return DemonstrationTable(
         channel,
@@ -193,9 +199,9 @@ def _channel_table(
         states if everywhere.all() else states[everywhere],
         actions,
         chosen,
-        tuple(one.name for one in demonstrations),
-        np.repeat(np.arange(len(demonstrations)), [len(one) for one in codes]),
-        np.concatenate([one.stamps for one in demonstrations])[everywhere],
+        tuple(demonstration.name for demonstration in demonstrations),
+        np.repeat(np.arange(len(demonstrations)), [len(code) for code in codes]),
+        np.concatenate([demonstration.stamps for demonstration in demonstrations])[everywhere],
         _before(channel, demonstrations, actions),
     )
 
@@ -236,8 +242,15 @@ def _before(
 ) -> IntArray | None:
     """LAT of each demonstration's first row; of what nobody ever showed, there is no condition."""
     known = {action: code for code, action in enumerate(actions)}
-    codes = [known.get(one.before.get(channel, ""), NO_ACTION) for one in demonstrations]
-    return np.array(codes, dtype=np.int64) if any(one.before for one in demonstrations) else None
+    codes = [
+        known.get(demonstration.before.get(channel, ""), NO_ACTION)
+        for demonstration in demonstrations
+    ]
+    return (
+        np.array(codes, dtype=np.int64)
+        if any(demonstration.before for demonstration in demonstrations)
+        else None
+    )
 
 
 def _joined_states(
@@ -255,20 +268,26 @@ def _joined_states(
     features = tuple(
         _unified(*_telling(place, demonstrations)) for place in range(len(first.features))
     )
-    states = np.concatenate([one.states for one in demonstrations])
+    states = np.concatenate([demonstration.states for demonstration in demonstrations])
     end = 0
-    for one in demonstrations:
-        start, end = end, end + len(one)
-        for index, (feature, unified) in enumerate(zip(one.features, features, strict=True)):
+    for demonstration in demonstrations:
+        start, end = end, end + len(demonstration)
+        for index, (feature, unified) in enumerate(
+            zip(demonstration.features, features, strict=True)
+        ):
             if feature.categories != unified.categories:
-                states[start:end, index] = _recoded(one.states[:, index], feature, unified)
+                states[start:end, index] = _recoded(
+                    demonstration.states[:, index], feature, unified
+                )
     return features, states
 
 
 def _telling(place: int, demonstrations: Sequence[Demonstration]) -> tuple[Feature, ...]:
     """A feature as the demonstrations have it in which it ever has a value; at least one."""
     found = [
-        one.features[place] for one in demonstrations if not np.isnan(one.states[:, place]).all()
+        demonstration.features[place]
+        for demonstration in demonstrations
+        if not np.isnan(demonstration.states[:, place]).all()
     ]
     return tuple(found or (demonstrations[0].features[place],))
 

@@ -175,9 +175,9 @@ def _thin_ticks(axes: Axes) -> None:
     low, high = axes.get_xlim()
     place = axes.transData.transform
     width = place((high, 0))[0] - place((low, 0))[0]
-    ticks = [one for one in axes.get_xticks() if low <= one <= high]
+    ticks = [xtick for xtick in axes.get_xticks() if low <= xtick <= high]
     apart = [
-        one for one in ticks if one == 0 or place((one, 0))[0] - place((low, 0))[0] > width / 20
+        tick for tick in ticks if tick == 0 or place((tick, 0))[0] - place((low, 0))[0] > width / 20
     ]
     axes.set_xticks(apart)
 

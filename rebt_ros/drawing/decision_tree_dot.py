@@ -17,14 +17,14 @@ digraph decision_tree {
 def render_decision_tree_dot(tree: DecisionTree) -> str:
     """Conditions and the actions that they lead to."""
     lines = [f"  label={quoted(f'Decision tree: {decision_tree_summary(tree)}')};"]
-    for position, one in enumerate(in_words(tree)):
+    for position, word in enumerate(in_words(tree)):
         # \\n is Graphviz's line break; it stands between two strings that are quoted for it.
-        label = quoted(one.text)
-        if one.detail:
-            label = f"{label[:-1]}\\n{quoted(one.detail)[1:]}"
+        label = quoted(word.text)
+        if word.detail:
+            label = f"{label[:-1]}\\n{quoted(word.detail)[1:]}"
         lines.append(
-            f"  n{position} [{looks(one.kind)}, label={label}, tooltip={quoted(one.explanation)}];"
+            f"  n{position} [{looks(word.kind)}, label={label}, tooltip={quoted(word.explanation)}];"
         )
-        if one.parent is not None:
-            lines.append(f"  n{one.parent} -> n{position} [label={quoted(one.answer)}];")
+        if word.parent is not None:
+            lines.append(f"  n{word.parent} -> n{position} [label={quoted(word.answer)}];")
     return _HEAD + "\n".join(lines) + "\n}\n"

@@ -33,13 +33,13 @@ def decision_tree_page(tree: DecisionTree) -> Page:
     steps = list(in_words(tree))
     figures = [
         Figure(
-            (Cell(one.text, one.kind, one.explanation, one.detail),),
-            one.parent,
-            one.answer,
+            (Cell(step.text, step.kind, step.explanation, step.detail),),
+            step.parent,
+            step.answer,
         )
-        for one in steps
+        for step in steps
     ]
-    parts = (legend(one.kind for one in steps), drawn(figures))
+    parts = (legend(step.kind for step in steps), drawn(figures))
     return page("Decision tree", decision_tree_summary(tree), parts)
 
 

@@ -57,7 +57,7 @@ def top_down(
     children = _children(boxes)
     gaps = (sibling_gap, cousin_gap)
     leftmost = _centres(boxes, children, gaps)
-    rightmost = _centres(boxes, [one[::-1] for one in children], gaps)
+    rightmost = _centres(boxes, [child[::-1] for child in children], gaps)
     centres = [(left - right) / 2 for left, right in zip(leftmost, rightmost, strict=True)]
     levels = [0] * len(boxes)
     for index, box in enumerate(boxes):

@@ -208,7 +208,7 @@ def _ids(actions: Iterable[nodes.Action]) -> dict[nodes.Action, str]:
 def _refuse_what_can_run(node: nodes.Parallel) -> None:
     runs = [one for one in nodes.walk(node) if isinstance(one, nodes.Action | nodes.Repeater)]
     if runs:
-        labels = [repr(one.label) for one in runs if isinstance(one, nodes.Action)]
+        labels = [repr(run.label) for run in runs if isinstance(run, nodes.Action)]
         raise DocumentError(
             f"the tree runs {', '.join(labels[:3]) or 'a Repeater'} in a Parallel, where "
             "BehaviorTree.CPP would not tick again what has ended while something else runs, nor "

@@ -147,7 +147,9 @@ def memories(
         where = f" on {channel}" if len(tested) > 1 else ""
         groups = list(
             dict.fromkeys(
-                frozenset(one.deciding) for one in conditions if isinstance(one, LastActionIs)
+                frozenset(condition.deciding)
+                for condition in conditions
+                if isinstance(condition, LastActionIs)
             )
         )
         named = [f"last action{_before(group)}{where}" for group in groups]
@@ -158,7 +160,7 @@ def memories(
         # Names that begin so are private: no other tree on the same blackboard has them.
         names = [f"_{name}" for name in plain]
         previous, ended, running, ticked = names[2 * len(groups) :]
-        remembers = any(isinstance(one, PreviousActionIs) for one in conditions)
+        remembers = any(isinstance(condition, PreviousActionIs) for condition in conditions)
         found[channel] = Memory(
             labels,
             row_kind,

@@ -26,8 +26,10 @@ def accept(
     if options.attach:
         printed = options.is_paper
         runnable = tuple(
-            one if printed else replace(one, subtree=going_on_after_loops(one.subtree))
-            for one in suggestions
+            suggestion
+            if printed
+            else replace(suggestion, subtree=going_on_after_loops(suggestion.subtree))
+            for suggestion in suggestions
         )
         tree = attach(tree, runnable, options.attach, root=options.root, in_front=not printed)
     if options.psa_choice is not None:
@@ -42,16 +44,18 @@ def mark(suggestions: Iterable[Suggestion], ids: Iterable[str]) -> tuple[Suggest
         OptionError: There is no suggestion with such an id.
     """
     suggestions, wanted = tuple(suggestions), set(ids)
-    unknown = sorted(wanted - {one.id for one in suggestions} - {ALL})
+    unknown = sorted(wanted - {suggestion.id for suggestion in suggestions} - {ALL})
     if unknown:
-        known = ", ".join(one.id for one in suggestions)
+        known = ", ".join(suggestion.id for suggestion in suggestions)
         raise OptionError(
             f"there is no suggestion {unknown[0]!r} to attach: "
             + (f"choose of {known}, or {ALL}." if known else "nothing was suggested.")
         )
     return tuple(
-        replace(one, attached=one.attached or one.id in wanted or ALL in wanted)
-        for one in suggestions
+        replace(
+            suggestion, attached=suggestion.attached or suggestion.id in wanted or ALL in wanted
+        )
+        for suggestion in suggestions
     )
 
 

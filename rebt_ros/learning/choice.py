@@ -243,7 +243,7 @@ class _Choice:
         before, after = without.levels(choices), with_them.levels(choices)
         counts = [one.fitted.path.leaf_counts() for one in (without, with_them)]
         leaves = [
-            int(one[levels.chosen]) for one, levels in zip(counts, (before, after), strict=True)
+            int(count[levels.chosen]) for count, levels in zip(counts, (before, after), strict=True)
         ]
         # Pruned trees can differ in size because one of them is pruned more: what differences say
         # in one test instead of many shows before pruning, too.

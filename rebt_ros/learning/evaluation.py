@@ -120,7 +120,9 @@ def _ticked_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
             for label in _recent_at(row, table):
                 history.begin(label)
             history.previous = _label(table, table.previous[row])
-        commands = [one for one in runtime.tick(state).commands if one.channel == table.channel]
+        commands = [
+            command for command in runtime.tick(state).commands if command.channel == table.channel
+        ]
         known = commands and commands[0].label in table.actions
         chosen.append(table.actions.index(commands[0].label) if known else NO_ACTION)
     return np.array(chosen, dtype=np.int64)
@@ -218,8 +220,8 @@ def _after(recent: tuple[str, ...], action: str, reach: int) -> tuple[str, ...]:
 def _reach(tree: nodes.Node) -> int:
     """How many distinct recent actions the tree's conditions can look back over."""
     reach = 0
-    for one in nodes.conditions(tree):
-        match one.literal.condition:
+    for condition in nodes.conditions(tree):
+        match condition.literal.condition:
             case PreviousActionIs():
                 reach = max(reach, 1)
             case LastActionIs(deciding=deciding):

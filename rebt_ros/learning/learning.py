@@ -111,7 +111,7 @@ class Learning:
         Raises:
             OptionError: One of them is not attached.
         """
-        attached = [one.id for one in self.learned.suggestions if one.attached]
+        attached = [suggestion.id for suggestion in self.learned.suggestions if suggestion.attached]
         gone = attached if ALL in ids else ids
         for name in gone:
             if name not in attached:
@@ -136,7 +136,7 @@ class Learning:
             ValueError: The changed tree tests or takes what is not declared.
         """
         learned = replace(self.learned, tree=edit(self.learned.tree))
-        offered = tuple(one for one in learned.suggestions if not one.attached)
+        offered = tuple(suggestion for suggestion in learned.suggestions if not suggestion.attached)
         plain = replace(learned, suggestions=offered)
         return replace(self, plain=plain)._accepting((), None)
 

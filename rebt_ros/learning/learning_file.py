@@ -229,7 +229,10 @@ def _plain(value: Any) -> Any:
 def _fit_words(fitted: FittedTree) -> dict[str, Any]:
     return {
         "history": fitted.vocabulary.history.value,
-        "differences": [[one.minuend, one.subtrahend] for one in fitted.vocabulary.differences],
+        "differences": [
+            [difference.minuend, difference.subtrahend]
+            for difference in fitted.vocabulary.differences
+        ],
         "max_depth": fitted.max_depth,
         "random_state": fitted.random_state,
         "notes": list(fitted.notes),

@@ -191,7 +191,7 @@ class Levels:
             places = np.array([judged.at(ccp_alpha)])
         for place in places:
             figures = (judged.mean_recalls, judged.means, judged.standard_errors)
-            return CrossValidated(*(float(one[place]) for one in figures))
+            return CrossValidated(*(float(figure[place]) for figure in figures))
         return None
 
 

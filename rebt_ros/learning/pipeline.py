@@ -113,20 +113,20 @@ def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
     channels = tuple(
         ChannelProvenance(
             learning.table.channel,
-            one.provenance.rows,
-            one.provenance.ccp_alpha,
-            one.provenance.history,
-            one.provenance.figures,
+            tree.provenance.rows,
+            tree.provenance.ccp_alpha,
+            tree.provenance.history,
+            tree.provenance.figures,
         )
-        for learning, one in zip(learnings, trees, strict=True)
+        for learning, tree in zip(learnings, trees, strict=True)
     )
     return LearnedTree(
         first.features,
-        tuple(action for one in trees for action in one.actions),
-        nodes.Parallel(tuple(one.tree for one in trees)),
+        tuple(action for tree in trees for action in tree.actions),
+        nodes.Parallel(tuple(tree.tree for tree in trees)),
         replace(
             first.provenance,
-            demonstrations=max(one.provenance.demonstrations for one in trees),
+            demonstrations=max(tree.provenance.demonstrations for tree in trees),
             rows=sum(one.rows for one in channels),
             ccp_alpha=max(one.ccp_alpha for one in channels),
             history=next(
@@ -134,18 +134,18 @@ def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
             ),
             figures=_pooled([one.figures for one in channels]),
             channels=channels,
-            late_rows=max(one.provenance.late_rows for one in trees),
+            late_rows=max(tree.provenance.late_rows for tree in trees),
             late_seconds=max(
-                (late for one in trees if (late := one.provenance.late_seconds) is not None),
+                (late for tree in trees if (late := tree.provenance.late_seconds) is not None),
                 default=None,
             ),
         ),
         tuple(
             replace(suggestion, id=f"{channel.channel}/{suggestion.id}")
-            for channel, one in zip(channels, trees, strict=True)
-            for suggestion in one.suggestions
+            for channel, tree in zip(channels, trees, strict=True)
+            for suggestion in tree.suggestions
         ),
-        tuple(channel for one in trees for channel in one.shown),
+        tuple(channel for tree in trees for channel in tree.shown),
         row_kind=first.row_kind,
         robot=first.robot,
     )
@@ -153,22 +153,22 @@ def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
 
 def _pooled(figures: Sequence[Figures]) -> Figures:
     """Figures over the rows of all channels."""
-    rows = sum(one.held_out_rows for one in figures)
+    rows = sum(figure.held_out_rows for figure in figures)
 
     def share(agreements: Sequence[float | None]) -> float | None:
         agreeing = [
-            agreement * one.held_out_rows
-            for agreement, one in zip(agreements, figures, strict=True)
+            agreement * figure.held_out_rows
+            for agreement, figure in zip(agreements, figures, strict=True)
             if agreement is not None
         ]
         return sum(agreeing) / rows if rows else None
 
     return Figures(
-        sum(one.fidelity_mismatches for one in figures),
-        share([one.teacher_forced_agreement for one in figures]),
-        share([one.own_history_agreement for one in figures]),
+        sum(figure.fidelity_mismatches for figure in figures),
+        share([figure.teacher_forced_agreement for figure in figures]),
+        share([figure.own_history_agreement for figure in figures]),
         rows,
-        share([one.mean_recall for one in figures]),
+        share([figure.mean_recall for figure in figures]),
     )
 
 

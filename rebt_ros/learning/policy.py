@@ -66,7 +66,7 @@ class Policy:
     @property
     def actions(self) -> tuple[str, ...]:
         """The labels that the tree may answer with."""
-        return tuple(dict.fromkeys(one.label for one in nodes.actions(self.learned.tree)))
+        return tuple(dict.fromkeys(action.label for action in nodes.actions(self.learned.tree)))
 
     def reset(self, episodes: int | Sequence[int] = 1) -> None:
         """Begins episodes, without any history.
@@ -77,8 +77,8 @@ class Policy:
         if isinstance(episodes, int):
             self._episodes = [_Episode(self.learned, self._ticked) for _ in range(episodes)]
         else:
-            for one in episodes:
-                self._episodes[one] = _Episode(self.learned, self._ticked)
+            for episode in episodes:
+                self._episodes[episode] = _Episode(self.learned, self._ticked)
 
     def act(self, state: State) -> Decision:
         """What to do now in the first episode.
@@ -139,7 +139,9 @@ class Policy:
             def holds(
                 condition: HistoryCondition, histories: Sequence[ActionHistory] = histories
             ) -> BoolArray:
-                return np.array([holds_after(one, condition) for one in histories], dtype=bool)
+                return np.array(
+                    [holds_after(history, condition) for history in histories], dtype=bool
+                )
 
             codes = plan.choose(plan.actions, States(self.learned.features, values, holds))
             for code, history, answer in zip(codes.tolist(), histories, chosen, strict=True):
@@ -165,5 +167,7 @@ class _Episode:
     def tick(self, state: Sequence[float]) -> dict[str, str | None]:
         """What the ticked tree does: the command of each channel, as the executor sends it."""
         assert self._runtime is not None
-        commands = {one.channel: one.label for one in self._runtime.tick(state).commands}
+        commands = {
+            command.channel: command.label for command in self._runtime.tick(state).commands
+        }
         return {channel: commands.get(channel) for channel in self._channels}

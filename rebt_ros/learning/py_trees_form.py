@@ -34,7 +34,9 @@ def to_py_trees(
     Raises:
         OptionError: An action of the tree has no behaviour.
     """
-    missing = [one.label for one in nodes.actions(learned.tree) if one.label not in behaviours]
+    missing = [
+        action.label for action in nodes.actions(learned.tree) if action.label not in behaviours
+    ]
     if missing:
         raise OptionError(
             f"the action {missing[0]!r} has no behaviour: give one for each label that the tree "

@@ -245,7 +245,7 @@ def _clear(trials: Sequence[Trial], explained: int) -> int:
 
 def _peak(trials: Sequence[Trial]) -> Trial:
     """The delay with the smallest explanation; of equal neighbours, see `estimate`."""
-    sizes = [one.size for one in trials]
+    sizes = [trial.size for trial in trials]
     first = last = sizes.index(min(sizes))
     while last + 1 < len(sizes) and sizes[last + 1] == sizes[first]:
         last += 1

@@ -86,7 +86,9 @@ class LearningReport:
         """A sentence for a service's answer; empty where nothing was judged."""
         if self.mean_recall is None or self.agreement is None:
             return ""
-        worst = min(self.actions, key=lambda one: 1.0 if one.recall is None else one.recall)
+        worst = min(
+            self.actions, key=lambda action: 1.0 if action.recall is None else action.recall
+        )
         return (
             f"Forecast: {self.agreement:.1%} agreement in cross-validation ({FORECAST}); mean "
             f"recall {self.mean_recall:.1%}, least {worst.recall:.1%} of {worst.label!r}."
@@ -95,9 +97,9 @@ class LearningReport:
     def as_json(self) -> dict[str, Any]:
         """For summary.json."""
         return {
-            "recall": {one.label: one.recall for one in self.actions},
-            "rows_of_actions": {one.label: one.rows for one in self.actions},
-            "never_taken": [one.label for one in self.actions if not one.taken],
+            "recall": {action.label: action.recall for action in self.actions},
+            "rows_of_actions": {action.label: action.rows for action in self.actions},
+            "never_taken": [action.label for action in self.actions if not action.taken],
             "cross_validated_mean_recall": self.mean_recall,
             "cross_validated_agreement": self.agreement,
             "most_frequent_action": self.most_frequent,
@@ -107,12 +109,13 @@ class LearningReport:
 
     def figures(self) -> Mapping[str, str]:
         """For /diagnostics."""
-        found = {f"recall of {one.label}": _share(one.recall) for one in self.actions}
+        found = {f"recall of {action.label}": _share(action.recall) for action in self.actions}
         return found | {
             "mean recall": _share(self.mean_recall),
             "forecast (agreement in cross-validation)": _share(self.agreement),
             "share of the most frequent action": _share(self.most_frequent),
-            "never taken": ", ".join(one.label for one in self.actions if not one.taken) or "none",
+            "never taken": ", ".join(action.label for action in self.actions if not action.taken)
+            or "none",
             "rows that states alone do not decide": str(self.conflicts),
         }
 

@@ -26,14 +26,14 @@ def psa_suggestions(
         rules: Minimized and float-reduced; their support is in training rows.
         inv_set: Literals to be shown as Inverters (Algorithm 1, line 3).
     """
-    groups = sorted((one for one in rules if len(one.actions) > 1), key=lambda one: -one.support)
+    groups = sorted((rule for rule in rules if len(rule.actions) > 1), key=lambda one: -one.support)
     return _numbered(
         (
             SuggestionKind.PSA,
-            one.support,
-            rule_tree(FactoredRule(one.actions, pull_out_common(one.dnf)), inv_set),
+            group.support,
+            rule_tree(FactoredRule(group.actions, pull_out_common(group.dnf)), inv_set),
         )
-        for one in groups
+        for group in groups
     )
 
 

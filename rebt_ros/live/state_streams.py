@@ -64,9 +64,9 @@ class StateStreams:
     def complete(self, now: int) -> int:
         """All states that were sent up to then have come, or are not waited for."""
         complete = LAST
-        for one in self._streams.values():
-            if one.sent is None:
+        for value in self._streams.values():
+            if value.sent is None:
                 return -1
-            if not one.ended and one.pauses < 2 and now - one.heard <= self._patience:
-                complete = min(complete, one.sent)
+            if not value.ended and value.pauses < 2 and now - value.heard <= self._patience:
+                complete = min(complete, value.sent)
         return complete

@@ -59,7 +59,7 @@ def channel_of(topic: str, channels: Iterable[str], topics: Sequence[str]) -> st
     'class'
     """
     names = list(channels)
-    same = [one for one in names if one.strip("/") == topic.strip("/")]
+    same = [name for name in names if name.strip("/") == topic.strip("/")]
     if not same and len(names) == len(topics) == 1:
         return names[0]
     return same[0] if same else None

@@ -31,7 +31,7 @@ class Conjunction:
 
     def without(self, literals: frozenset[Literal]) -> Conjunction:
         """The conjunction less the given literals, in the same order."""
-        return Conjunction(tuple(one for one in self.literals if one not in literals))
+        return Conjunction(tuple(literal for literal in self.literals if literal not in literals))
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,7 +64,8 @@ class FactoredCodes(NamedTuple):
 def named(parts: FactoredCodes, numbering: Numbering) -> Factored:
     """What was factored in numbers, in literals."""
     return Factored(
-        numbering.literals(parts.common), tuple(named(one, numbering) for one in parts.alternatives)
+        numbering.literals(parts.common),
+        tuple(named(alternative, numbering) for alternative in parts.alternatives),
     )
 
 

@@ -21,7 +21,8 @@ def with_intervals(condition: Factored) -> Factored:
         condition: Factored already: as one condition, a pair cannot be pulled apart any more.
     """
     return Factored(
-        merged(condition.common), tuple(with_intervals(one) for one in condition.alternatives)
+        merged(condition.common),
+        tuple(with_intervals(alternative) for alternative in condition.alternatives),
     )
 
 

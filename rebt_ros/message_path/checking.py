@@ -330,9 +330,9 @@ class _Checker:
                 f"{part} comes after a function of two messages: only functions of a number may, "
                 "and at most one of .@delta and .@derivative"
             )
-        if name in {one.value for one in Series}:
+        if name in {Sery.value for Sery in Series}:
             self._follow(part)
-        elif name in {one.value for one in Angles}:
+        elif name in {Angle.value for Angle in Angles}:
             self._rotation(part)
         elif name == LENGTH:
             self._length(part)
@@ -378,7 +378,7 @@ class _Checker:
                 self._refuse(
                     f"{part} needs a vector (x, y and z), and there is {self._described()}"
                 )
-            fields = [shape.kind.field(one) for one in axes]
+            fields = [shape.kind.field(axis) for axis in axes]
             self._add(
                 Vector(tuple(one.attribute for one in fields if one)), _Value(Primitive.NUMBER)
             )

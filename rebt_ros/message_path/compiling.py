@@ -87,7 +87,7 @@ def wanted_of(path: CheckedPath) -> tuple[tuple[str, ...], ...]:
 def getter(path: CheckedPath) -> Getter:
     """The function that reads a path."""
     steps, last = list(path.steps), _text if path.kind is Primitive.TEXT else _finite
-    place = next((at for at, one in enumerate(steps) if isinstance(one, Follow)), None)
+    place = next((at for at, step in enumerate(steps) if isinstance(step, Follow)), None)
     if place is None:
         before = _chained([*_functions(steps), last])
         return lambda message, _: cast(Value, before(message))

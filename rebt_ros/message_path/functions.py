@@ -82,21 +82,21 @@ ARITHMETIC: Final[Mapping[str, Callable[[float], Scalar]]] = {
 
 
 def _smallest(values: Sequence[float]) -> float | None:
-    return min((one for one in values if one == one), default=None)
+    return min((value for value in values if value == value), default=None)
 
 
 def _largest(values: Sequence[float]) -> float | None:
-    return max((one for one in values if one == one), default=None)
+    return max((value for value in values if value == value), default=None)
 
 
 def _mean(values: Sequence[float]) -> float | None:
-    there = [one for one in values if one == one]
+    there = [value for value in values if value == value]
     # Of infinite ones of both signs there is no sum.
     return sum(there) / len(there) if there else None
 
 
 def _place_of_smallest(values: Sequence[float]) -> float | None:
-    there = [place for place, one in enumerate(values) if one == one]
+    there = [place for place, value in enumerate(values) if value == value]
     return min(there, key=values.__getitem__, default=None)
 
 

@@ -51,7 +51,7 @@ class Checked:
     @property
     def keeps_all(self) -> bool:
         """Whether every rule is proven."""
-        return all(one.answer is Answer.PROVEN for one in self.verdicts)
+        return all(verdict.answer is Answer.PROVEN for verdict in self.verdicts)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -120,7 +120,7 @@ def repaired(checked: Checked) -> Repaired:
     Raises:
         RuleError: Guards are not enough.
     """
-    asked = [one.demand for one in checked.verdicts]
+    asked = [verdict.demand for verdict in checked.verdicts]
     return repair(checked.learned, asked, checked.rows, checked.results)
 
 

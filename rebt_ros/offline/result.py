@@ -81,19 +81,21 @@ def summarize(result: OfflineLearning) -> dict[str, Any]:
         "ccp_alpha": provenance.ccp_alpha,
         "suggestions": [
             {
-                "id": one.id,
-                "kind": one.kind.value,
-                "support": one.support,
-                "unit": one.kind.unit.value,
-                "nodes": nodes.size(one.subtree),
-                "attached": one.attached,
+                "id": suggestion.id,
+                "kind": suggestion.kind.value,
+                "support": suggestion.support,
+                "unit": suggestion.kind.unit.value,
+                "nodes": nodes.size(suggestion.subtree),
+                "attached": suggestion.attached,
             }
-            for one in learned.suggestions
+            for suggestion in learned.suggestions
         ],
     }
     if len(result.learnings) == 1:
         return summary | _choices(result.learnings[0])
-    return summary | {"channels": {one.table.channel: _of_channel(one) for one in result.learnings}}
+    return summary | {
+        "channels": {learning.table.channel: _of_channel(learning) for learning in result.learnings}
+    }
 
 
 def _of_channel(learning: Learning) -> dict[str, Any]:
@@ -113,7 +115,7 @@ def _of_channel(learning: Learning) -> dict[str, Any]:
 def _intervals(tree: nodes.Node) -> int:
     """Nodes that stand for two thresholds each."""
     conditions = (node for node in nodes.walk(tree) if isinstance(node, nodes.Condition))
-    return sum(isinstance(one.literal.condition, Interval) for one in conditions)
+    return sum(isinstance(condition.literal.condition, Interval) for condition in conditions)
 
 
 def _choices(learning: Learning) -> dict[str, Any]:
@@ -130,7 +132,9 @@ def _levels(levels: JudgedLevels | None) -> Iterator[dict[str, float]]:
     """The pruning levels that were chosen from, with their agreement in cross-validation."""
     if levels is not None:
         columns = (levels.ccp_alphas, levels.mean_recalls, levels.means, levels.standard_errors)
-        for alpha, recall, mean, error in zip(*(one.tolist() for one in columns), strict=True):
+        for alpha, recall, mean, error in zip(
+            *(column.tolist() for column in columns), strict=True
+        ):
             yield {
                 "ccp_alpha": alpha,
                 "mean_recall": recall,

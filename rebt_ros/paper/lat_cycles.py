@@ -151,8 +151,10 @@ class _Work:
         """Replaces the nodes of the cycle by a cycle node, to which their edges move."""
         node = self.cycle_node(cycle, start)
         number = max(self._nodes) + 1
-        before = [one for member in cycle for one in self._engine.predecessors(member)]
-        after = [one for member in cycle for one in self._engine.successors(member)]
+        before = [
+            predecessor for member in cycle for predecessor in self._engine.predecessors(member)
+        ]
+        after = [successor for member in cycle for successor in self._engine.successors(member)]
         self._nodes[number] = node
         self._rank[number] = min(self._rank[member] for member in cycle)
         self._engine.add_node(number)
@@ -279,7 +281,7 @@ class _Steps:
 
 
 def _places(owners: list[_Owners]) -> dict[_Owners, int]:
-    return {one: place for place, one in enumerate(owners)}
+    return {owner: place for place, owner in enumerate(owners)}
 
 
 def _contracted(runs: _Runs) -> _Runs:
@@ -289,7 +291,7 @@ def _contracted(runs: _Runs) -> _Runs:
 
 
 def _renamed(owners: _Owners, cycle: _Cycle, number: int) -> _Owners:
-    kept = tuple(one for one in owners if one not in cycle)
+    kept = tuple(owner for owner in owners if owner not in cycle)
     return owners if len(kept) == len(owners) else (*kept, number)
 
 

@@ -52,7 +52,7 @@ def rows(table: DemonstrationTable) -> Runs:
         return ()
     labels = np.array(table.actions, dtype=object)[table.chosen]
     borders = np.flatnonzero(np.diff(table.demonstration)) + 1
-    return tuple(tuple(one.tolist()) for one in np.split(labels, borders))
+    return tuple(tuple(part.tolist()) for part in np.split(labels, borders))
 
 
 class Occurrences:

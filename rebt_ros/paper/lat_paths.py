@@ -107,5 +107,5 @@ def _best_first(engine: nx.DiGraph, graph: LatGraph, occurrences: Occurrences) -
 def _number_of_paths(engine: nx.DiGraph) -> int:
     onwards: dict[int, int] = {}
     for number in reversed(list(nx.topological_sort(engine))):
-        onwards[number] = sum(onwards[one] for one in engine.successors(number)) or 1
+        onwards[number] = sum(onwards[successor] for successor in engine.successors(number)) or 1
     return sum(onwards[number] for number in engine if engine.in_degree(number) == 0)

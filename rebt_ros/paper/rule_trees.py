@@ -45,19 +45,20 @@ def build_inv_set(rules: Iterable[Rule]) -> frozenset[Literal]:
 
 def logic_minimizer(rules: Iterable[Rule]) -> tuple[Rule, ...]:
     """LOGIC_MINIMIZER: the rules with espresso's DNFs."""
-    return tuple(Rule(one.actions, minimize.minimize(one.dnf), one.support) for one in rules)
+    return tuple(Rule(rule.actions, minimize.minimize(rule.dnf), rule.support) for rule in rules)
 
 
 def reduce_floats(rules: Iterable[Rule]) -> tuple[Rule, ...]:
     """FLOAT_REDUCTION: the rules without subsumed thresholds."""
     return tuple(
-        Rule(one.actions, float_reduction.float_reduction(one.dnf), one.support) for one in rules
+        Rule(rule.actions, float_reduction.float_reduction(rule.dnf), rule.support)
+        for rule in rules
     )
 
 
 def pullout_common(rules: Iterable[Rule]) -> tuple[FactoredRule, ...]:
     """PULLOUT_COMMON: the rules with the literals that all their conjunctions share in front."""
-    return tuple(FactoredRule(one.actions, factoring.pull_out_common(one.dnf)) for one in rules)
+    return tuple(FactoredRule(rule.actions, factoring.pull_out_common(rule.dnf)) for rule in rules)
 
 
 def rule_tree(rule: FactoredRule, inv_set: frozenset[Literal]) -> nodes.Node:
@@ -94,7 +95,10 @@ def condition_trees(condition: Factored, inv_set: frozenset[Literal]) -> list[no
     """Lines 14 to 26: what must succeed, one after the other, before the action."""
     trees: list[nodes.Node] = [_literal_tree(literal, inv_set) for literal in condition.common]
     if condition.alternatives:
-        alternatives = [sequence(condition_trees(one, inv_set)) for one in condition.alternatives]
+        alternatives = [
+            sequence(condition_trees(alternative, inv_set))
+            for alternative in condition.alternatives
+        ]
         trees.append(nodes.Selector(tuple(alternatives)))
     return trees
 

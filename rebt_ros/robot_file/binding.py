@@ -51,8 +51,8 @@ class BoundTopic:
         return frozenset(
             wanted
             for found in (
-                *(wanted_of(one.path) for one in self.features),
-                *(one.wanted for one in self.labellers.values()),
+                *(wanted_of(feature.path) for feature in self.features),
+                *(value.wanted for value in self.labellers.values()),
             )
             for wanted in found
         )

@@ -60,16 +60,16 @@ def proposal(topics: Sequence[TopicSurvey], source: str) -> str:
         "topics:",
     ]
     states = [one for one in shown if one.topic not in used and not _only_acts(one)]
-    proposed = {one.topic: _features(one) for one in states}
+    proposed = {state.topic: _features(state) for state in states}
     named = _named([one for its in proposed.values() for one in its])
     for one in shown:
         if one.topic in used or any(its.wanted for its in proposed.get(one.topic, ())):
             lines.append(f"  {_key(one.topic)}: {one.kind}")
     lines.append("state:")
-    for one in states:
-        if proposed[one.topic]:
-            lines.append(f"  # {one.topic}, {one.kind}, {one.rate:.3g} Hz")
-        for its in proposed[one.topic]:
+    for state in states:
+        if proposed[state.topic]:
+            lines.append(f"  # {state.topic}, {state.kind}, {state.rate:.3g} Hz")
+        for its in proposed[state.topic]:
             lead = "  " if its.wanted else "  # "
             lines.append(f"{lead}{named[id(its)]}: {_quoted(its.path)}  # {its.comment}")
     lines.append("actions:")
@@ -89,29 +89,29 @@ def _only_acts(topic: TopicSurvey) -> bool:
 
 def _actions(topics: Sequence[TopicSurvey]) -> Iterator[tuple[str, list[str]]]:
     """Sources of actions, the most likely one first: the topic of each, and its lines."""
-    said = [one for one in topics if one.kind == _STRING and "action" in one.topic]
+    said = [topic for topic in topics if topic.kind == _STRING and "action" in topic.topic]
     for one in said:
         seen = one.field(".data")
         labels = seen.in_words() if seen else ""
         yield one.topic, [f"action: {_quoted(f'{one.topic}.data')}  # {labels}"]
-    for one in topics:
-        if one.kind == _JOY and (lines := _joy(one)):
-            yield one.topic, ["action:", f"  joy: {_key(one.topic)}", *lines]
-    for one in topics:
-        if one.kind in _TWISTS and (lines := _twist(one)):
-            yield one.topic, ["action:", f"  twist: {_key(one.topic)}", *lines]
+    for topic in topics:
+        if topic.kind == _JOY and (lines := _joy(topic)):
+            yield topic.topic, ["action:", f"  joy: {_key(topic.topic)}", *lines]
+    for topic in topics:
+        if topic.kind in _TWISTS and (lines := _twist(topic)):
+            yield topic.topic, ["action:", f"  twist: {_key(topic.topic)}", *lines]
 
 
 def _joy(topic: TopicSurvey) -> list[str]:
     """Buttons and axes that were used."""
     buttons, axes = [], []
-    for one in topic.fields:
-        match one.path.parts:
-            case (FieldName(name="buttons"), Index(index=index)) if one.varies:
+    for field in topic.fields:
+        match field.path.parts:
+            case (FieldName(name="buttons"), Index(index=index)) if field.varies:
                 buttons.append(f"{index}: button_{index}")
-            case (FieldName(name="axes"), Index(index=index)) if one.varies:
-                ends = [f"0.5: axis_{index}_up"] if one.most >= 0.5 else []
-                ends += [f"-0.5: axis_{index}_down"] if one.least <= -0.5 else []
+            case (FieldName(name="axes"), Index(index=index)) if field.varies:
+                ends = [f"0.5: axis_{index}_up"] if field.most >= 0.5 else []
+                ends += [f"-0.5: axis_{index}_down"] if field.least <= -0.5 else []
                 if ends:
                     axes.append(f"{index}: {{{', '.join(ends)}}}")
     lines = (
@@ -141,13 +141,17 @@ def _twist(topic: TopicSurvey) -> list[str]:
 def _features(topic: TopicSurvey) -> list[_Proposed]:
     if topic.kind == _SCAN:
         return _sectors(topic)
-    varying = [one for one in topic.fields if one.varies and _is_plain(one)]
+    varying = [field for field in topic.fields if field.varies and _is_plain(field)]
     found = [
         _Proposed(_name(topic, one), str(one.path), one.in_words(), wanted=place < _MOST_OF_TOPIC)
         for place, one in enumerate(varying)
     ]
     # What is 0 or empty all the time tells nothing.
-    still = [one for one in topic.fields if any(one.values) and not one.varies and _is_plain(one)]
+    still = [
+        field
+        for field in topic.fields
+        if any(field.values) and not field.varies and _is_plain(field)
+    ]
     return found + [
         _Proposed(_name(topic, one), str(one.path), f"always {one.in_words()}", wanted=False)
         for one in still[: max(0, _MOST_OF_TOPIC - len(found))]

@@ -170,7 +170,7 @@ def _feature(name: str, place: Place) -> StateFeature:
 def _categories(place: Place) -> dict[str, str]:
     """Names by value; of a list, each value is its own name."""
     if isinstance(place.value, list):
-        texts = [one.text() for one in place.elements()]
+        texts = [element.text() for element in place.elements()]
         if len(set(texts)) < len(texts):
             place.refuse("name a category twice")
         found = dict(zip(texts, texts, strict=True))

@@ -64,11 +64,11 @@ class FieldSurvey:
         if not self.seen:
             return "no value"
         if self.kind is Primitive.TEXT:
-            texts = [repr(one) for one in self.values[:4]]
+            texts = [repr(value) for value in self.values[:4]]
             return ", ".join(texts) + (", …" if len(self.values) > len(texts) else "")
         if self.names:
-            numbers = [int(one) for one in self.values if not isinstance(one, str)]
-            return ", ".join(self.names.get(one, str(one)) for one in numbers[:4])
+            numbers = [int(value) for value in self.values if not isinstance(value, str)]
+            return ", ".join(self.names.get(number, str(number)) for number in numbers[:4])
         if not self.varies:
             return f"{self.least:g}"
         return f"{self.least:.4g} … {self.most:.4g}"

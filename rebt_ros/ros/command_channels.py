@@ -123,11 +123,12 @@ class CommandChannels:
             How many commands went out.
         """
         if self._robot is not None:
-            for one in commands:
-                begins = self._channels[one.channel].sent != one.label
-                self._robot.send(one.label, begins=begins)
+            for command in commands:
+                begins = self._channels[command.channel].sent != command.label
+                self._robot.send(command.label, begins=begins)
         return sum(
-            self._channels[one.channel].send(one.label, self._every_tick) for one in commands
+            self._channels[command.channel].send(command.label, self._every_tick)
+            for command in commands
         )
 
     def stop(self) -> None:

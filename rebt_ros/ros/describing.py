@@ -55,7 +55,7 @@ def _look(node: Node, surveys: dict[str, TopicSurvey], notes: dict[str, str]) ->
     """Subscribes to the topics that have appeared."""
     for topic, kinds in node.get_topic_names_and_types():
         publishers = node.get_publishers_info_by_topic(topic)
-        others = [one for one in publishers if one.node_name != node.get_name()]
+        others = [publisher for publisher in publishers if publisher.node_name != node.get_name()]
         if topic in surveys or topic in notes or not others:
             continue
         try:

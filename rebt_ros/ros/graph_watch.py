@@ -56,7 +56,7 @@ class GraphWatch:
             Their sentences, in the same order.
         """
         now = time.monotonic()
-        waiting = {one.sentence: one.waits for one in findings}
+        waiting = {finding.sentence: finding.waits for finding in findings}
         self._since = {one: self._since.get(one, now) for one in waiting}
         self._logged.intersection_update(waiting)
         for sentence, waits in waiting.items():
@@ -68,27 +68,27 @@ class GraphWatch:
 
     def unheard(self, subscriptions: Iterable[Subscription]) -> Iterator[Finding]:
         """Why subscriptions hear nothing, or not all."""
-        for one in subscriptions:
-            if not self._publishers(one.topic_name):
-                yield Finding(f"nobody publishes on {one.topic_name}", waits=True)
-            yield from self.misfits([one])
+        for subscription in subscriptions:
+            if not self._publishers(subscription.topic_name):
+                yield Finding(f"nobody publishes on {subscription.topic_name}", waits=True)
+            yield from self.misfits([subscription])
 
     def misfits(self, subscriptions: Iterable[Subscription]) -> Iterator[Finding]:
         """Publishers that subscriptions cannot hear."""
         for subscription in subscriptions:
             topic, wanted = subscription.topic_name, _type_of(subscription)
-            for one in self._publishers(topic):
-                if one.topic_type != wanted:
-                    name = _name(one)
+            for publisher in self._publishers(topic):
+                if publisher.topic_type != wanted:
+                    name = _name(publisher)
                     yield Finding(
-                        f"{name} publishes {one.topic_type} on {topic}, not {wanted}",
+                        f"{name} publishes {publisher.topic_type} on {topic}, not {wanted}",
                         waits=name == _UNKNOWN,
                     )
                     continue
-                fit, reason = qos_check_compatible(one.qos_profile, subscription.qos_profile)
+                fit, reason = qos_check_compatible(publisher.qos_profile, subscription.qos_profile)
                 if fit == QoSCompatibility.ERROR:
                     reason = reason.strip().rstrip(";").removeprefix("ERROR: ")
-                    name = _name(one)
+                    name = _name(publisher)
                     yield Finding(
                         f"{name} offers incompatible QoS on {topic}, and none of its messages is "
                         f"received ({reason})",
@@ -113,7 +113,10 @@ class GraphWatch:
 
     def publishing(self, topic: str) -> list[str]:
         """The full names of the nodes that publish on a topic, sorted; equal names may recur."""
-        nodes = {(bytes(one.endpoint_gid[_PROCESS]), _name(one)) for one in self._publishers(topic)}
+        nodes = {
+            (bytes(publisher.endpoint_gid[_PROCESS]), _name(publisher))
+            for publisher in self._publishers(topic)
+        }
         return sorted(name for _, name in nodes)
 
     def unread(self, topics: Iterable[str]) -> Iterator[Finding]:

@@ -58,7 +58,7 @@ def _values(kind: str, several: re.Match[str], before: Any, place: Place) -> Any
     fixed, most = kind.endswith("]"), several[2]
     if most is not None and (len(elements) > int(most) or (fixed and len(elements) != int(most))):
         place.must_be(f"a list of {'' if fixed else 'at most '}{most} elements")
-    values = [_value(several[1], None, one) for one in elements]
+    values = [_value(several[1], None, element) for element in elements]
     return array(before.typecode, values) if isinstance(before, array) else values
 
 

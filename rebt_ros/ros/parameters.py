@@ -182,12 +182,12 @@ class Parameters:
         return list(value) if isinstance(value, array) else value
 
     def _refuse_other_choices(self, parameters: list[Parameter]) -> SetParametersResult:
-        for one in parameters:
-            choices = self._choices.get(one.name, ())
-            if choices and one.value not in choices:
+        for parameter in parameters:
+            choices = self._choices.get(parameter.name, ())
+            if choices and parameter.value not in choices:
                 return SetParametersResult(
                     successful=False,
-                    reason=f"{one.name} must be one of {', '.join(choices)}, not {one.value!r}",
+                    reason=f"{parameter.name} must be one of {', '.join(choices)}, not {parameter.value!r}",
                 )
         return SetParametersResult(successful=True)
 

@@ -95,9 +95,9 @@ class RobotTopics:
             if topic not in self.bound:
                 self._try_to_bind(topic, publishers[0].topic_type)
             if topic in self.bound:
-                self._try_to_follow(topic, [one.qos_profile for one in publishers])
+                self._try_to_follow(topic, [publisher.qos_profile for publisher in publishers])
         return [
-            *(Finding(one, waits=False) for one in self._problems.values()),
+            *(Finding(value, waits=False) for value in self._problems.values()),
             *(
                 Finding(f"nobody publishes on {topic}", waits=True)
                 for topic in self._topics

@@ -36,8 +36,8 @@ def check_topics(node: Node, states: Iterable[str], commands: Iterable[str]) -> 
         DocumentError: A name is none, or is taken by a topic of another type.
     """
     types: dict[str, object] = {_LOG: None}
-    types |= {one.topic_name: one.msg_type for one in node.publishers}
-    types |= {one.topic_name: one.msg_type for one in node.subscriptions}
+    types |= {publisher.topic_name: publisher.msg_type for publisher in node.publishers}
+    types |= {subscription.topic_name: subscription.msg_type for subscription in node.subscriptions}
     wanted = [("commands on", name, String) for name in commands]
     wanted += [("reads the state topic", name, Float64MultiArray) for name in states]
     for does, name, kind in wanted:

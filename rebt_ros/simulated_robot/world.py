@@ -54,7 +54,9 @@ class World:
         """Metres to the nearest wall or obstacle; negative inside of one."""
         walls = min(place.x, place.y, self.size - place.x, self.size - place.y)
         return min(
-            walls, *(place.distance(one.center) - one.radius for one in self.obstacles), math.inf
+            walls,
+            *(place.distance(obstacle.center) - obstacle.radius for obstacle in self.obstacles),
+            math.inf,
         )
 
     def nearest(self, place: Point, first: float, last: float) -> float:
@@ -68,7 +70,7 @@ class World:
             first: Right border of the cone, as a heading in radians.
             last: Left border; at most pi more than the right one.
         """
-        straight = [place.direction(one.center) for one in self.obstacles] + _WALLS
+        straight = [place.direction(obstacle.center) for obstacle in self.obstacles] + _WALLS
         inside = [one for one in straight if (one - first) % math.tau < last - first]
         return min(self._ray(place, heading) for heading in (first, last, *inside))
 
@@ -76,11 +78,11 @@ class World:
         """Metres to what a ray hits first."""
         cosine, sine = math.cos(heading), math.sin(heading)
         hit = min(_until_wall(place.x, cosine, self.size), _until_wall(place.y, sine, self.size))
-        for one in self.obstacles:
-            x, y = one.center.x - place.x, one.center.y - place.y
+        for obstacle in self.obstacles:
+            x, y = obstacle.center.x - place.x, obstacle.center.y - place.y
             along, across = x * cosine + y * sine, x * sine - y * cosine
-            if along > 0 and abs(across) < one.radius:
-                hit = min(hit, along - math.sqrt(one.radius**2 - across**2))
+            if along > 0 and abs(across) < obstacle.radius:
+                hit = min(hit, along - math.sqrt(obstacle.radius**2 - across**2))
         return hit
 
 

@@ -83,7 +83,10 @@ def read_bag(
             else [StateTopic(name) for name in states]
         )
         builder = DemonstrationBuilder(topics, actions, sample_rate)
-        wanted = {*((one, STATE_TYPE) for one in states), *((one, ACTION_TYPE) for one in actions)}
+        wanted = {
+            *((state, STATE_TYPE) for state in states),
+            *((action, ACTION_TYPE) for action in actions),
+        }
         feed = Feed(path, builder, skip_bad, {name: bag.found[name, STATE_TYPE] for name in states})
         rows = (row for message in messages_of(path, bag, wanted) for row in feed.rows_of(*message))
         first = next(rows, None)

@@ -158,8 +158,8 @@ def _metadata(directory: Path, notes: list[str]) -> bag_metadata.BagMetadata | N
 def _gaps_in_numbers(directory: Path) -> Iterator[str]:
     """Notes which files are not there by the numbers that recorders give to them, from 0."""
     numbers: dict[str, set[int]] = {}
-    for one in filter(holds_messages, directory.iterdir()):
-        if found := _NUMBERED.fullmatch(one.name):
+    for path in filter(holds_messages, directory.iterdir()):
+        if found := _NUMBERED.fullmatch(path.name):
             numbers.setdefault(found[1], set()).add(int(found[2]))
     for base, there in sorted(numbers.items()):
         missing = [number for number in range(min(max(there), _MOST_FILES)) if number not in there]
@@ -172,7 +172,7 @@ def _files(
     directory: Path, metadata: bag_metadata.BagMetadata | None, notes: list[str]
 ) -> list[Path]:
     """The files of messages, those that are listed first; notes what differs from the list."""
-    there = sorted(one for one in directory.iterdir() if holds_messages(one) and one.is_file())
+    there = sorted(path for path in directory.iterdir() if holds_messages(path) and path.is_file())
     plain = {one.name for one in there}
     twice = [one for one in there if without_packing(one.name) in plain - {one.name}]
     files = [one for one in there if one not in twice]
@@ -184,7 +184,7 @@ def _files(
         return files
     listed = {name: place for place, name in enumerate(metadata.files)}
     known = {without_packing(name) for name in listed}
-    missing = sorted(known - {without_packing(one.name) for one in files})
+    missing = sorted(known - {without_packing(file.name) for file in files})
     if missing and not files:
         raise InputError(
             f"{directory} lacks the files that its {bag_metadata.NAME} lists "
@@ -192,10 +192,10 @@ def _files(
         )
     for name in missing:
         notes.append(f"{name} is listed in {bag_metadata.NAME} and not there: it was not read")
-    for one in files:
-        if without_packing(one.name) not in known:
-            notes.append(f"{one.name} is not listed in {bag_metadata.NAME}: it is read as well")
-    return sorted(files, key=lambda one: (listed.get(one.name, len(listed)), one.name))
+    for file in files:
+        if without_packing(file.name) not in known:
+            notes.append(f"{file.name} is not listed in {bag_metadata.NAME}: it is read as well")
+    return sorted(files, key=lambda file: (listed.get(file.name, len(listed)), file.name))
 
 
 def _open_all(files: Sequence[Path], bag: BagFiles, stack: ExitStack) -> None:

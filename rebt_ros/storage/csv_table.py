@@ -156,7 +156,7 @@ def _open(
     if not header:
         _refuse_header(table)
     notes += _left_out(records)
-    if any(row[one] != row[one].strip() for one in table.labels for row in table.rows):
+    if any(row[label] != row[label].strip() for label in table.labels for row in table.rows):
         notes.append("blanks around actions do not count")
     return table
 
@@ -181,7 +181,7 @@ def _states(
         if place not in table.labels and name not in left_out
     ]
     read = {place: shown.column(place) for place in places}
-    if any(isinstance(one, Column) and one.decimal_commas for one in read.values()):
+    if any(isinstance(value, Column) and value.decimal_commas for value in read.values()):
         # In a table with decimal commas, points stand between groups of three digits.
         read = {place: shown.column(place, decimal_commas=True) for place in places}
     found: list[Column] = []

@@ -35,10 +35,10 @@ def write_csv(path: Path, demonstration: Demonstration, succeeded: BoolArray) ->
     """
     features = demonstration.features
     if len(demonstration.channels) != 1 or any(
-        one.kind is not FeatureKind.NUMERIC for one in features
+        feature.kind is not FeatureKind.NUMERIC for feature in features
     ):
         raise ValueError("only numbers and the actions of one channel can be written")
-    names = [one.name for one in features]
+    names = [feature.name for feature in features]
     taken = next((name for name in names if name in _RESERVED), None)
     if taken is not None:
         raise InputError(

@@ -178,9 +178,9 @@ def _sources(path: Path) -> Iterator[tuple[Path, InputKind]]:
 def _within(directory: Path) -> Iterator[tuple[Path, InputKind]]:
     """The demonstrations in a directory that is no bag: recordings, bags or tables."""
     inside = sorted(directory.iterdir())
-    bags = [one for one in inside if one.is_dir() and is_bag(one)]
+    bags = [path for path in inside if path.is_dir() and is_bag(path)]
     recorded = (
-        one for one in inside if one.suffix == SUFFIX and one.is_file() and is_recording(one)
+        path for path in inside if path.suffix == SUFFIX and path.is_file() and is_recording(path)
     )
     if first := next(recorded, None):
         if bags:
@@ -188,19 +188,19 @@ def _within(directory: Path) -> Iterator[tuple[Path, InputKind]]:
                 f"{directory} holds bags and recordings ({bags[0].name}, {first.name}): name those "
                 "to read."
             )
-        yield from ((one, InputKind.RECORDING) for one in recordings(directory))
+        yield from ((recording, InputKind.RECORDING) for recording in recordings(directory))
         return
-    tables = [one for one in inside if _has_table_suffix(one) and one.is_file()]
+    tables = [path for path in inside if _has_table_suffix(path) and path.is_file()]
     if not bags and not tables:
-        yield from ((one, InputKind.RECORDING) for one in recordings(directory))
+        yield from ((recording, InputKind.RECORDING) for recording in recordings(directory))
         return
     if bags and tables:
         raise InputError(
             f"{directory} holds bags and tables ({bags[0].name}, {tables[0].name}): name those to "
             "read."
         )
-    yield from ((one, InputKind.BAG) for one in bags)
-    yield from ((one, InputKind.TABLE) for one in tables)
+    yield from ((bag, InputKind.BAG) for bag in bags)
+    yield from ((table, InputKind.TABLE) for table in tables)
 
 
 def _kind_of(file: Path) -> InputKind:

@@ -258,12 +258,14 @@ def recordings(directory: Path) -> tuple[Path, ...]:
         InputError: There is no such directory, or there is no recording in it.
     """
     try:
-        files = sorted(one for one in directory.iterdir() if one.suffix == SUFFIX and one.is_file())
+        files = sorted(
+            path for path in directory.iterdir() if path.suffix == SUFFIX and path.is_file()
+        )
     except NotADirectoryError as err:
         raise InputError(f"{directory} is not a directory: name one with recordings.") from err
     except OSError as err:
         raise unreadable(directory, err) from err
-    found = tuple(one for one in files if is_recording(one))
+    found = tuple(file for file in files if is_recording(file))
     if not found:
         raise InputError(f"{directory} holds no recordings: record a demonstration first.")
     return found

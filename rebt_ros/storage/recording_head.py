@@ -93,7 +93,7 @@ class Head:
             raise ValueError(f"its version is {version!r}, not {VERSION} or {ROBOT_VERSION}")
         if not isinstance(features, list) or not isinstance(channels, list):
             raise ValueError("it lists no features or no channels")
-        if not all(isinstance(one, str) for one in channels):
+        if not all(isinstance(channel, str) for channel in channels):
             raise ValueError("a channel is not text")
         if len(set(channels)) < len(channels):
             raise ValueError("two channels have the same name")
@@ -201,7 +201,7 @@ def _parse_feature(value: object) -> Feature:
         isinstance(kind, str)
         and kind in kinds
         and isinstance(categories, list)
-        and all(isinstance(one, str) for one in categories)
+        and all(isinstance(category, str) for category in categories)
         and len(set(categories)) == len(categories)
     ):
         raise ValueError(f"{value!r} is not a feature")

@@ -74,9 +74,9 @@ def read_robot_bag(
                 topic: bind(robot, name, topic[1], types)
                 for topic, name in _chosen(path, kinds, robot).items()
             }
-        states = [one for one in wanted.values() if one.features]
+        states = [value for value in wanted.values() if value.features]
         categories: dict[str, Categories] = {}
-        readers = {one.name: FeatureReader(one, categories) for one in states}
+        readers = {state.name: FeatureReader(state, categories) for state in states}
         builder = DemonstrationBuilder(
             state_topics_of(robot),
             list(robot.actions),

@@ -176,7 +176,7 @@ class SqliteFile:
         self.found.clear()
         with self.path.open("rb") as file:
             pages = SqlitePages(file)
-            self.found.update(one.topic for one in pages.messages())
+            self.found.update(message.topic for message in pages.messages())
         count = self.found.total()
         # Recorders number messages from 1.
         lost = f" of at least {pages.highest}" if pages.highest > count else ""

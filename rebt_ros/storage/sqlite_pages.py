@@ -154,7 +154,7 @@ def _places(page: bytes, begin: int, head: int) -> Iterator[int]:
     (count,) = struct.unpack_from(">H", page, begin + 3) if len(page) >= begin + head else (0,)
     count = min(count, (len(page) - begin - head) // 2)
     places = struct.unpack_from(f">{count}H", page, begin + head)
-    yield from (one for one in dict.fromkeys(places) if begin + head <= one < len(page) - 4)
+    yield from (place for place in dict.fromkeys(places) if begin + head <= place < len(page) - 4)
 
 
 def _varint(data: bytes, place: int) -> tuple[int, int]:

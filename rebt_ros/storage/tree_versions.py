@@ -64,9 +64,9 @@ class TreeVersions:
         if not self._directory.is_dir():
             return []
         return sorted(
-            one
-            for one in self._directory.iterdir()
-            if one.name.split(".")[0].isdecimal() and one.name.endswith(suffix)
+            path
+            for path in self._directory.iterdir()
+            if path.name.split(".")[0].isdecimal() and path.name.endswith(suffix)
         )
 
     def _text(self, path: Path) -> str:

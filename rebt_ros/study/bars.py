@@ -41,7 +41,7 @@ class BarChart:
     y_label: str
 
     def __post_init__(self) -> None:
-        if any(len(one.counts) != len(self.groups) for one in self.series):
+        if any(len(series.counts) != len(self.groups) for series in self.series):
             raise ValueError("each series needs a count for each group")
 
 
@@ -78,7 +78,7 @@ def histogram(
 
 def bar_chart_svg(chart: BarChart) -> str:
     """The chart; each bar says in a tooltip what it stands for."""
-    most = max((count for one in chart.series for count in one.counts), default=0)
+    most = max((count for series in chart.series for count in series.counts), default=0)
     step = _step(most)
     top = max(step, math.ceil(most / step) * step)
     body = "\n".join([*_axes(chart, step, top), *_bars(chart, top), *_legend(chart)])
@@ -127,13 +127,13 @@ def _axes(chart: BarChart, step: int, top: int) -> Iterator[str]:
 
 def _bars(chart: BarChart, top: int) -> Iterator[str]:
     width = (_x(chart, 1) - _x(chart, 0)) * (1 - _GAP) / len(chart.series)
-    for number, one in enumerate(chart.series):
-        for place, count in enumerate(one.counts):
+    for number, series in enumerate(chart.series):
+        for place, count in enumerate(series.counts):
             if not count:
                 continue
             x = _x(chart, place + _GAP / 2) + number * width
             y = _y(count, top)
-            tooltip = f"{chart.groups[place]}, {one.name}: {count}"
+            tooltip = f"{chart.groups[place]}, {series.name}: {count}"
             yield (
                 f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" '
                 f'height="{_y(0, top) - y:.1f}" style="fill:var(--series-{number + 1})">'
@@ -143,12 +143,12 @@ def _bars(chart: BarChart, top: int) -> Iterator[str]:
 
 def _legend(chart: BarChart) -> Iterator[str]:
     x = _WIDTH - _RIGHT - 130.0 * len(chart.series)
-    for number, one in enumerate(chart.series):
+    for number, series in enumerate(chart.series):
         yield (
             f'<rect x="{x:g}" y="24" width="11" height="11" '
             f'style="fill:var(--series-{number + 1})"/>'
         )
-        yield _text(x + 16, 34, one.name, "ink")
+        yield _text(x + 16, 34, series.name, "ink")
         x += 130.0
 
 

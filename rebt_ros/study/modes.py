@@ -62,7 +62,7 @@ def offer(
     suggestions, _ = suggest(table, trained, ccp_alpha, options, routines, occurrences)
     if len(suggestions) > MOST_SUGGESTIONS:
         raise AssertionError(f"{len(suggestions)} suggestions by default")
-    subtrees = tuple(one.subtree for one in suggestions)
+    subtrees = tuple(suggestion.subtree for suggestion in suggestions)
     return Offer((*under_root(main), *subtrees), len(suggestions))
 
 

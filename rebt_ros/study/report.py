@@ -92,7 +92,7 @@ def _mode(figures: ModeFigures) -> dict[str, Any]:
         "offered": _spread(figures.subtrees_offered),
         "suggestions": _spread(figures.suggestions_offered),
         "minima_proven": figures.proven,
-        "lost_to_baseline": [asdict(one) for one in figures.losses],
+        "lost_to_baseline": [asdict(loss) for loss in figures.losses],
     }
 
 
@@ -215,7 +215,7 @@ def _outcome(distance: float, baseline: float) -> str:
 
 def rows_of_table(report: ExperimentReport) -> list[tuple[str, ...]]:
     """The paper's figures beside ours, with a heading, for a person to read."""
-    columns = [_column(one) for one in report.figures.values()]
+    columns = [_column(value) for value in report.figures.values()]
     theirs = _published_column()
     heading = ("", "paper (reported)", *(f"{mode.value} (ours)" for mode in report.figures))
     return [

@@ -90,8 +90,8 @@ def run_configuration(config: ExperimentConfig, settings: Settings) -> Configura
     levels = _levels(table)
     distances = Distances()
     subtrees = tuple(
-        _subtree(number, as_behavior_tree(one), table, levels, distances)
-        for number, one in enumerate(config.subtrees, start=1)
+        _subtree(number, as_behavior_tree(subtree), table, levels, distances)
+        for number, subtree in enumerate(config.subtrees, start=1)
     )
     pairs = Pairs(distances.compared, distances.excluded, distances.measured)
     agreements = held_out_agreements(table)
@@ -200,7 +200,7 @@ def _networkx_pairs(
     generated = dict.fromkeys(
         one.tree for made in levels.values() for level in made for one in level.generated
     )
-    simulated = [labelled(as_behavior_tree(one)) for one in config.subtrees]
+    simulated = [labelled(as_behavior_tree(subtree)) for subtree in config.subtrees]
     pairs = [(one, other) for one in simulated if one is not None for other in generated]
     drawn = Random(f"{settings.seed} {config.name} networkx").sample(
         pairs, min(settings.networkx_pairs, len(pairs))

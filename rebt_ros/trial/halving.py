@@ -163,7 +163,7 @@ class Trial:
         """All candidates from best to worst: who left later, then as of `ranked`."""
         order = ranked([self._tally(one) for one in range(len(self._sizes))], self._sizes)
         standings = [Standing(one, self._tally(one), self._last_round[one]) for one in order]
-        return tuple(sorted(standings, key=lambda one: -one.round))
+        return tuple(sorted(standings, key=lambda standing: -standing.round))
 
     @property
     def winner(self) -> int | None:

@@ -49,12 +49,14 @@ def verdict(result: TrialResult) -> str:
         f"({HEAD[-1]} {_percent(tally.interval)})."
     )
     rivals = [
-        one for one in others if one.round == best.round and not tally.surely_above(one.tally)
+        other
+        for other in others
+        if other.round == best.round and not tally.surely_above(other.tally)
     ]
     if not rivals:
         return sentence
-    names = ", ".join(result.candidates[one.candidate].name for one in rivals)
-    level = all(one.tally == tally for one in rivals)
+    names = ", ".join(result.candidates[rival.candidate].name for rival in rivals)
+    level = all(rival.tally == tally for rival in rivals)
     why = "none of these is smaller" if level else "more episodes would tell"
     return f"{sentence} So few episodes do not tell it from {names}: {why}."
 
@@ -98,7 +100,7 @@ def _entry(result: TrialResult, standing: Standing) -> dict[str, Any]:
         "success": tally.share,
         "interval": list(tally.interval),
         "round": standing.round + 1,
-        "outcomes": [_outcome(one) for one in result.episodes[standing.candidate]],
+        "outcomes": [_outcome(episode) for episode in result.episodes[standing.candidate]],
     }
 
 

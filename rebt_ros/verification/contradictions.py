@@ -27,11 +27,11 @@ def refuse_contradictions(source: str, demands: Sequence[Demand], learned: Learn
     Raises:
         RuleError: It names both rules, and a state in which they contradict each other.
     """
-    for one in demands:
+    for demand in demands:
         with contextlib.suppress(Unsettled):
-            if _state_of(one.when, one, learned) is None:
+            if _state_of(demand.when, demand, learned) is None:
                 raise RuleError(
-                    f"{source}, {one.rule.place}: the condition of '{one.rule}' never holds: no "
+                    f"{source}, {demand.rule.place}: the condition of '{demand.rule}' never holds: no "
                     "state is like that."
                 )
     for first, second in combinations(demands, 2):

@@ -180,8 +180,10 @@ def _field_text(field: Field, cells: BoolArray) -> str:
 
 
 def _categories_text(name: str, categories: Sequence[str], known: BoolArray) -> str:
-    there = [name_text(one) for one, has in zip(categories, known, strict=True) if has]
-    absent = [name_text(one) for one, has in zip(categories, known, strict=True) if not has]
+    there = [name_text(category) for category, has in zip(categories, known, strict=True) if has]
+    absent = [
+        name_text(category) for category, has in zip(categories, known, strict=True) if not has
+    ]
     if len(absent) == 1 and len(there) > 1:
         return f"{name} ≠ {absent[0]}"
     return f"{name} = {' or '.join(there)}"

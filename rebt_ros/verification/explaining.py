@@ -177,7 +177,7 @@ def _cells_of(
     grid: Grid, learned: LearnedTree, values: Sequence[float], history: ActionHistory
 ) -> list[int]:
     """The cell of a state in each field."""
-    by_name = dict(zip((one.name for one in learned.features), values, strict=True))
+    by_name = dict(zip((feature.name for feature in learned.features), values, strict=True))
     cells = []
     for field in grid.fields:
         if field.quantity is None:

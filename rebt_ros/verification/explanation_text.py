@@ -51,7 +51,9 @@ def _branches(traced: Step) -> tuple[Step, ...]:
 
 
 def _named(node: nodes.Node) -> str:
-    return " or ".join(dict.fromkeys(name_text(one.label) for one in nodes.actions(node))) or "?"
+    return (
+        " or ".join(dict.fromkeys(name_text(action.label) for action in nodes.actions(node))) or "?"
+    )
 
 
 class _Words:

@@ -73,7 +73,7 @@ def _findings(
         sweep(tree, grid, results, Ticks.ANY, visits=True) if remembers(tree, results) else first
     )
     taken = {possible.leaves[leaf] for leaf in set(possible.commanding.tolist()) if leaf >= 0}
-    shown = [one for one in learned.actions if one.channel == channel]
+    shown = [action for action in learned.actions if action.channel == channel]
     idle = first.boxes[:, first.commanding < 0]
     return Findings(
         channel,

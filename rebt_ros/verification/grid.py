@@ -176,7 +176,7 @@ class Grid:
     @property
     def differences(self) -> tuple[Field, ...]:
         """The fields that are differences."""
-        return tuple(one for one in self.fields if isinstance(one.quantity, Difference))
+        return tuple(field for field in self.fields if isinstance(field.quantity, Difference))
 
     def everything(self) -> Boxes:
         """One box with all cells."""
@@ -307,8 +307,8 @@ def _words(cells: int) -> int:
 
 def _histories(conditions: Sequence[HistoryCondition]) -> tuple[HistoryCell, ...]:
     """All histories that the conditions can tell apart, each once."""
-    labels = {one.action for one in conditions}
-    looking_back = [one for one in conditions if isinstance(one, LastActionIs)]
+    labels = {condition.action for condition in conditions}
+    looking_back = [condition for condition in conditions if isinstance(condition, LastActionIs)]
     labels.update(label for one in looking_back for label in one.deciding)
     known = (*sorted(labels), ANOTHER_ACTION)
     # What is the most recent action outside of n ones, the latest n + 1 tell.
@@ -328,5 +328,7 @@ def _histories(conditions: Sequence[HistoryCondition]) -> tuple[HistoryCell, ...
                 older = (previous,) if previous is not None and previous not in recent else ()
                 cell = HistoryCell((*older, *reversed(recent)), previous)
                 history = cell.history()
-                found.setdefault(tuple(holds_after(history, one) for one in conditions), cell)
+                found.setdefault(
+                    tuple(holds_after(history, condition) for condition in conditions), cell
+                )
     return tuple(found.values())

@@ -130,7 +130,7 @@ def check(
             policies.get(channel),
             shown[channel] if channel in shown else of_tree(learned, channel),
             results,
-        ).proof([one for one in demands if one.action.channel == channel])
+        ).proof([demand for demand in demands if demand.action.channel == channel])
         for channel in channels
     )
 
@@ -156,7 +156,7 @@ def verdicts(proofs: Sequence[ChannelProof], demands: Sequence[Demand]) -> tuple
     of: Mapping[int, Verdict] = {
         id(verdict.demand): verdict for proof in proofs for verdict in proof.verdicts
     }
-    return tuple(of[id(one)] for one in demands)
+    return tuple(of[id(demand)] for demand in demands)
 
 
 def grid_of(
@@ -189,7 +189,9 @@ class _ChannelCheck:
         finder = StateFinder(grid, self.learned.features, self.shown)
         regions = [breaking(one, grid, first) for one in demands]
         candidates = self._candidates(finder, regions)
-        commands = self._commands([one.point for one in candidates if isinstance(one, Near)])
+        commands = self._commands(
+            [candidate.point for candidate in candidates if isinstance(candidate, Near)]
+        )
         found = []
         for demand, region, near in zip(demands, regions, candidates, strict=True):
             coverage = self._coverage(demand)
@@ -228,15 +230,15 @@ class _ChannelCheck:
             return iter([None] * len(points))
         repeats = any(isinstance(node, nodes.Repeater) for node in nodes.walk(tree))
         if repeats or self.results is Results.REPORTED:
-            return (command_in(self.learned, self.channel, one, self.results) for one in points)
+            return (command_in(self.learned, self.channel, point, self.results) for point in points)
         histories = [
-            ActionHistory() if one.before is None else one.before.history() for one in points
+            ActionHistory() if point.before is None else point.before.history() for point in points
         ]
 
         def holds(condition: HistoryCondition) -> BoolArray:
-            return np.array([holds_after(one, condition) for one in histories], dtype=bool)
+            return np.array([holds_after(history, condition) for history in histories], dtype=bool)
 
-        values = np.array([one.values for one in points]).reshape(len(points), -1)
+        values = np.array([point.values for point in points]).reshape(len(points), -1)
         actions = nodes.actions(tree)
         chosen = choose(tree, actions, States(self.learned.features, values, holds))
         return (actions[code] if code >= 0 else None for code in chosen.tolist())
@@ -287,7 +289,7 @@ def command_in(
         {channel: history},
     )
     commands = runtime.tick(point.values).commands
-    return next((one for one in commands if one.channel == channel), None)
+    return next((command for command in commands if command.channel == channel), None)
 
 
 def breaking(demand: Demand, grid: Grid, done: Sweep) -> Boxes:

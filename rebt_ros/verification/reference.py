@@ -39,7 +39,10 @@ def of_tree(learned: LearnedTree, channel: str) -> Reference:
     """What a tree knows of the rows it was learned from; without it, there are no rows."""
     leaves = [leaf for one in learned.shown if one.channel == channel for leaf in one.leaves]
     ranges = [
-        [_range(values, one) for values, one in zip(leaf.values, learned.features, strict=True)]
+        [
+            _range(values, feature)
+            for values, feature in zip(leaf.values, learned.features, strict=True)
+        ]
         for leaf in leaves
     ]
     both = np.array(ranges, dtype=np.float64).reshape(len(leaves), len(learned.features), 2)

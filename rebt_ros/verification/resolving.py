@@ -76,9 +76,9 @@ class _Resolver:
 
     def _action(self) -> nodes.Action:
         label, channel = self.rule.action, self.rule.channel
-        found = [one for one in self.learned.actions if one.label == label]
+        found = [action for action in self.learned.actions if action.label == label]
         if not found:
-            labels = dict.fromkeys(one.label for one in self.learned.actions)
+            labels = dict.fromkeys(action.label for action in self.learned.actions)
             self._refuse_rule(f"there is no action {label!r}: there are {_listed([*labels])}")
         on_channel = [one for one in found if channel in (None, one.channel)]
         if not on_channel:
@@ -164,7 +164,8 @@ class _Resolver:
         wanted = right.text
         if wanted not in feature.categories and isinstance(right, Number):
             wanted = next(
-                (one for one in feature.categories if number_of(one) == right.value), wanted
+                (category for category in feature.categories if number_of(category) == right.value),
+                wanted,
             )
         if wanted not in feature.categories:
             listed = _listed(feature.categories)
@@ -173,11 +174,11 @@ class _Resolver:
             )
         if sign is Sign.EQUAL:
             return _among(feature, (wanted,))
-        return _among(feature, [one for one in feature.categories if one != wanted])
+        return _among(feature, [category for category in feature.categories if category != wanted])
 
     def _is_measured(self, side: Side) -> bool:
         if isinstance(side, Word):
-            return any(one.name == side.text for one in self.learned.features)
+            return any(feature.name == side.text for feature in self.learned.features)
         return isinstance(side, Subtraction)
 
     def _quantity(self, side: Side) -> Quantity:
@@ -210,7 +211,7 @@ class _Resolver:
         self._refuse(f"there is no feature {word.text!r}: there are {names}", word.at)
 
     def _label(self, word: Word) -> str:
-        labels = tuple(dict.fromkeys(one.label for one in self.learned.actions))
+        labels = tuple(dict.fromkeys(action.label for action in self.learned.actions))
         if word.text not in labels:
             self._refuse(f"there is no action {word.text!r}: there are {_listed(labels)}", word.at)
         return word.text
@@ -228,7 +229,7 @@ def _known(quantity: Quantity) -> Formula:
 
 def _among(feature: Feature, categories: Sequence[str]) -> Formula:
     """Has one of these categories; a missing value has none."""
-    parts = tuple(Literal(HasCategory(feature.name, one)) for one in categories)
+    parts = tuple(Literal(HasCategory(feature.name, category)) for category in categories)
     return parts[0] if len(parts) == 1 else AnyOf(parts)
 
 

@@ -352,15 +352,15 @@ class _Sweeper:
     def _whole(self, ends: _Ends, own: _Paths, before: Boxes) -> _Ends:
         """The ends with boxes that were split for nothing whole again."""
         parts = (ends.success, ends.failure, ends.running)
-        if sum(one.shape[1] for one in parts) > own.shape[1]:
+        if sum(part.shape[1] for part in parts) > own.shape[1]:
             success = self._undivided(ends.success, (ends.failure, ends.running), own)
             failure = self._undivided(ends.failure, (ends.success, ends.running), own)
             parts = (success, failure, ends.running)
         marked = []
-        for one in parts:
+        for part in parts:
             # What was passed on as it came belongs to others as well.
-            copy = one.copy()
-            copy[self._origin] = before[one[self._origin].astype(np.int64)]
+            copy = part.copy()
+            copy[self._origin] = before[part[self._origin].astype(np.int64)]
             marked.append(copy)
         return _Ends(*marked)
 
@@ -368,8 +368,8 @@ class _Sweeper:
         """An end in which each box that ended nowhere else, and did nothing, is whole again."""
         origin = end[self._origin].astype(np.int64)
         split = np.bincount(origin, minlength=own.shape[1]) > 1
-        for one in others:
-            split[one[self._origin].astype(np.int64)] = False
+        for other in others:
+            split[other[self._origin].astype(np.int64)] = False
         split[origin[end[self._claim] != own[self._claim, origin]]] = False
         if not split.any():
             return end
@@ -408,9 +408,9 @@ def _needs_of_any(children: Sequence[_Step]) -> _Needs:
     """What a Selector needs: of each field, the cells that some child needs, where all need any."""
     first, *others = (child.needs for child in children)
     return {
-        start: reduce(np.bitwise_or, (one[start] for one in others), mask)
+        start: reduce(np.bitwise_or, (other[start] for other in others), mask)
         for start, mask in first.items()
-        if all(start in one for one in others)
+        if all(start in other for other in others)
     }
 
 
@@ -419,7 +419,7 @@ def _none(paths: _Paths) -> _Paths:
 
 
 def _joined(parts: Sequence[_Paths]) -> _Paths:
-    full = [one for one in parts if one.shape[1]]
+    full = [part for part in parts if part.shape[1]]
     if len(full) == 1:
         return full[0]
     return np.concatenate(full, axis=1) if full else parts[0][:, :0]

@@ -69,7 +69,7 @@ def histories_of(actions: str, learned: LearnedTree) -> dict[str, ActionHistory]
         OptionError: There is no such action.
     """
     histories = {action.channel: ActionHistory() for action in learned.actions}
-    for label in filter(None, (one.strip() for one in actions.split(","))):
+    for label in filter(None, (part.strip() for part in actions.split(","))):
         channels = [one.channel for one in learned.actions if one.label == label]
         if not channels:
             labels = ", ".join(dict.fromkeys(one.label for one in learned.actions))

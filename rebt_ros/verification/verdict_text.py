@@ -16,7 +16,7 @@ def what_breaks(
     learned: LearnedTree, proofs: Sequence[ChannelProof], verdicts: Sequence[Verdict]
 ) -> str:
     """The rules that a tree was not shown to keep, for a sentence; empty if there are none."""
-    failed = [one for one in verdicts if one.answer is not Answer.PROVEN]
+    failed = [verdict for verdict in verdicts if verdict.answer is not Answer.PROVEN]
     if not failed:
         return ""
     first = _in_short(learned, proofs, failed[0])
@@ -78,7 +78,7 @@ def regions(what: str, boxes: Boxes, grid: Grid, most: int) -> Iterator[str]:
 
 
 def _proof_of(verdict: Verdict, proofs: Sequence[ChannelProof]) -> ChannelProof:
-    return next(one for one in proofs if one.channel == verdict.demand.action.channel)
+    return next(proof for proof in proofs if proof.channel == verdict.demand.action.channel)
 
 
 def _done(verdict: Verdict) -> str:

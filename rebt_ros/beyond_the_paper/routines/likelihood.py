@@ -83,7 +83,7 @@ class Models:
 
     def __init__(self, programs: Sequence[Program], corpus: Corpus) -> None:
         persistence = round(min(max(corpus.continues, 0.3), 0.9), 2)
-        parts = [[stream_model(stream, persistence) for stream in one] for one in programs]
+        parts = [[stream_model(stream, persistence) for stream in program] for program in programs]
         count = len(programs)
         streams = max(map(len, parts))
         states = max(sum(len(part.states) for part in one) for one in parts)
@@ -120,7 +120,7 @@ class Models:
         self._goes_on = np.full((count, borders + 1), 0.45, np.float32)
         self._goes_on[:, borders] = 0
         self._kind = np.full((count, _KINDS), 1 / _KINDS, np.float32)
-        price = np.array([complexity(one) for one in programs]) * _PRICE * corpus.moments
+        price = np.array([complexity(program) for program in programs]) * _PRICE * corpus.moments
         self._worth_of_nothing = corpus.rows * np.log(_NOISE) - price
         self._assemble()
 

@@ -29,7 +29,7 @@ def neighbours(program: Program, corpus: Corpus, rounds: int) -> list[Program]:
         corpus: Tells which actions follow each other.
         rounds: How often routines are repeated if they are.
     """
-    changed = (tidy(one) for one in _changes(program, _Links(corpus), rounds))
+    changed = (tidy(change) for change in _changes(program, _Links(corpus), rounds))
     return [
         one
         for one in dict.fromkeys(changed)

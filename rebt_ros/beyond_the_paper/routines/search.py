@@ -133,7 +133,11 @@ def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
     seen = {best.program}
     looked = 0
     while looked < most:
-        waiting = [one for one in neighbours(best.program, corpus, rounds) if one not in seen]
+        waiting = [
+            neighbour
+            for neighbour in neighbours(best.program, corpus, rounds)
+            if neighbour not in seen
+        ]
         draw.shuffle(waiting)
         # With many actions there are more neighbours than can be looked at.
         waiting = waiting[: most - looked]

@@ -348,9 +348,11 @@ class ExecutorNode(Node):
             return None
         # What is commanded there is not a person's, and the others are listened to already.
         others = commands.topics | {
-            self.resolve_topic_name(one) for one in self._settings.takeover.topics
+            self.resolve_topic_name(topic) for topic in self._settings.takeover.topics
         }
-        topics = (one for one in robot.action_topics if self.resolve_topic_name(one) not in others)
+        topics = (
+            topic for topic in robot.action_topics if self.resolve_topic_name(topic) not in others
+        )
         return RobotTopics(self, robot, tuple(topics), _PERSON_DEPTH, self._person_callback)
 
     def _person_callback(self, bound: BoundTopic) -> Callable[..., None]:
@@ -563,7 +565,7 @@ class ExecutorNode(Node):
             }
             stale = self._program.inputs.stale(self._now())
             topics = self._program.inputs.topics
-            values |= {f"state of {one}": stale.get(one, "fresh") for one in topics}
+            values |= {f"state of {topic}": stale.get(topic, "fresh") for topic in topics}
         if self._candidate is not None:
             values["the next tree waits for"] = ", ".join(self._unheard(self._candidate))
         values |= self._faults.counts
@@ -607,7 +609,7 @@ class ExecutorNode(Node):
         """Labels of the tree for which the robot file has no command."""
         if self._program is None or self._robot_commands is None or self._settings.robot is None:
             return []
-        labels = {one.label for one in nodes.actions(self._program.learned.tree)}
+        labels = {action.label for action in nodes.actions(self._program.learned.tree)}
         found = ", ".join(map(repr, self._robot_commands.missing(sorted(labels))))
         sentence = f"{self._settings.robot.name} has no command for {found}"
         return [Finding(sentence, waits=False)] if found else []

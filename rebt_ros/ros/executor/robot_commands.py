@@ -68,12 +68,12 @@ class RobotCommands:
     @property
     def topics(self) -> frozenset[str]:
         """The full names of the topics on which messages are published."""
-        return frozenset(str(one.topic_name) for one in self._publishers.values())
+        return frozenset(str(value.topic_name) for value in self._publishers.values())
 
     def begin_tick(self) -> None:
         """Must be called before each tick of the tree."""
-        for one in self._long.values():
-            one.begin_tick()
+        for value in self._long.values():
+            value.begin_tick()
 
     def send(self, label: str, *, begins: bool) -> None:
         """Publishes what a label says, if it does.

@@ -183,7 +183,7 @@ def _state_topics(names: Sequence[str], fields: Sequence[str]) -> tuple[StateTop
     named: dict[str, tuple[str, ...]] = {}
     for entry in fields:
         topic, colon, listed = entry.partition(":")
-        parts = tuple(one.strip() for one in listed.split(","))
+        parts = tuple(part.strip() for part in listed.split(","))
         if not colon or not all(parts):
             raise OptionError(
                 f"parameter 'state_fields' has {entry!r}: write it as 'topic:field,field'."

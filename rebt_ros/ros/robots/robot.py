@@ -156,7 +156,7 @@ class RobotNode(Node):
         self._under_way = True
 
     def _on_parameters(self, parameters: list[Parameter]) -> None:
-        self._new_first_start |= any(one.name == "first_start" for one in parameters)
+        self._new_first_start |= any(parameter.name == "first_start" for parameter in parameters)
 
     def _on_tick(self) -> None:
         self._silence += 1
@@ -197,7 +197,7 @@ class RobotNode(Node):
         watch = self._watch
         # One who commands is enough.
         findings = [*watch.timeless(), *watch.misfits(self._commands)]
-        if not any(watch.publishing(one.topic_name) for one in self._commands):
+        if not any(watch.publishing(command.topic_name) for command in self._commands):
             findings += watch.unheard(self._commands)
         problems = watch.say(findings)
         message = "under way" if self._under_way else "waiting for a command"

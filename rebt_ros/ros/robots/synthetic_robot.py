@@ -175,7 +175,7 @@ class SyntheticRobotNode(Node):
             Whether there are enough subscribers to begin.
         """
         topics = (self._states, self._actions)
-        if any(one.get_subscription_count() < self._audience for one in topics):
+        if any(topic.get_subscription_count() < self._audience for topic in topics):
             return False
         self._publish_state()
         self._actions.publish(String())
@@ -194,7 +194,7 @@ class SyntheticRobotNode(Node):
 
     def _report(self) -> Report:
         watch, topics = self._watch, (self._states, self._actions)
-        findings = [*watch.timeless(), *watch.unread(one.topic_name for one in topics)]
+        findings = [*watch.timeless(), *watch.unread(topic.topic_name for topic in topics)]
         problems = watch.say(findings if self._enabled and not self._over else ())
         values = {"enabled": self._enabled, "ticks": self._ticked, "actions": self._done}
         message = self._what_it_does().rstrip(".")

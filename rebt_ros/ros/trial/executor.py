@@ -171,5 +171,5 @@ class ExecutorHandle:
         for status in message.status:
             if status.name == f"{self._source}: execution":
                 self._message = status.message
-                self._values = {one.key: one.value for one in status.values}
+                self._values = {value.key: value.value for value in status.values}
                 self._refused = self._values.get(_REFUSED, "")

@@ -128,7 +128,7 @@ class TopicJudge:
                 "the name."
             )
         publishers = self._peer.get_publishers_info_by_topic(self._topic)
-        kinds = sorted({one.topic_type for one in publishers})
+        kinds = sorted({publisher.topic_type for publisher in publishers})
         kind = _KINDS.get(kinds[0]) if len(kinds) == 1 else None
         if kind is None:
             raise OptionError(
@@ -141,7 +141,8 @@ class TopicJudge:
                 "--outcome-field out."
             )
         reliable = all(
-            one.qos_profile.reliability is ReliabilityPolicy.RELIABLE for one in publishers
+            publisher.qos_profile.reliability is ReliabilityPolicy.RELIABLE
+            for publisher in publishers
         )
         # What was published before is of no interest, even where the publisher remembers it.
         qos = QoSProfile(
