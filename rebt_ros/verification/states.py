@@ -174,7 +174,13 @@ class StateFinder:
             if not isinstance(field.quantity, str):
                 continue
             # Many boxes have the same cells of a field.
-            different, which = np.unique(boxes[field.words], axis=1, return_inverse=True)
+            words = boxes[field.words]
+            if len(words) == 1:
+                # Numbers are sorted much faster than columns.
+                different, which = np.unique(words[0], return_inverse=True)
+                different = different[np.newaxis]
+            else:
+                different, which = np.unique(words, axis=1, return_inverse=True)
             cells = field.cells_of_words(different)
             if len(cells) == 1 and cells.all():
                 continue
