@@ -23,7 +23,8 @@ def render_decision_tree_dot(tree: DecisionTree) -> str:
         if word.detail:
             label = f"{label[:-1]}\\n{quoted(word.detail)[1:]}"
         lines.append(
-            f"  n{position} [{looks(word.kind)}, label={label}, tooltip={quoted(word.explanation)}];"
+            f"  n{position} [{looks(word.kind)}, label={label}, "
+            f"tooltip={quoted(word.explanation)}];"
         )
         if word.parent is not None:
             lines.append(f"  n{word.parent} -> n{position} [label={quoted(word.answer)}];")

@@ -187,7 +187,8 @@ class Parameters:
             if choices and parameter.value not in choices:
                 return SetParametersResult(
                     successful=False,
-                    reason=f"{parameter.name} must be one of {', '.join(choices)}, not {parameter.value!r}",
+                    reason=f"{parameter.name} must be one of {', '.join(choices)}, "
+                    f"not {parameter.value!r}",
                 )
         return SetParametersResult(successful=True)
 

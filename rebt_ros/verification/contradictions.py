@@ -31,8 +31,8 @@ def refuse_contradictions(source: str, demands: Sequence[Demand], learned: Learn
         with contextlib.suppress(Unsettled):
             if _state_of(demand.when, demand, learned) is None:
                 raise RuleError(
-                    f"{source}, {demand.rule.place}: the condition of '{demand.rule}' never holds: no "
-                    "state is like that."
+                    f"{source}, {demand.rule.place}: the condition of '{demand.rule}' never "
+                    "holds: no state is like that."
                 )
     for first, second in combinations(demands, 2):
         with contextlib.suppress(Unsettled):
