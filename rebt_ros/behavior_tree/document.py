@@ -261,7 +261,7 @@ def _encode_quantity(quantity: Quantity) -> Json:
     return {"feature": quantity}
 
 
-def _shown(value: object) -> str:
+def _abridged(value: object) -> str:
     """A value for a message, in as little room and time as it takes to recognize it."""
     return _cut(_SHORT.repr(value), 60)
 
@@ -278,7 +278,7 @@ class _Place:
         self.path = path
 
     def refuse(self, expected: str) -> NoReturn:
-        raise DocumentError(f"{self.path} must be {expected}, not {_shown(self.value)}.")
+        raise DocumentError(f"{self.path} must be {expected}, not {_abridged(self.value)}.")
 
     def fields(self, *required: str, optional: tuple[str, ...] = ()) -> dict[str, _Place]:
         """The fields of an object that has all of `required` and nothing unknown."""
@@ -289,7 +289,7 @@ class _Place:
         if missing:
             raise DocumentError(f"{self.path} lacks {missing[0]!r}.")
         if unknown:
-            raise DocumentError(f"{self.path} has the unknown field {_shown(unknown[0])}.")
+            raise DocumentError(f"{self.path} has the unknown field {_abridged(unknown[0])}.")
         return {name: _Place(value, f"{self.path}.{name}") for name, value in self.value.items()}
 
     def items(self, read: Callable[[_Place], _T], least: int = 0) -> tuple[_T, ...]:
@@ -360,7 +360,7 @@ def _learned_tree(place: _Place) -> LearnedTree:
     # JSON does not tell 3.0 from 3.
     if isinstance(version, bool) or not isinstance(version, int | float) or version not in _ADDED:
         raise DocumentError(
-            f"the document has version {_shown(version)}: "
+            f"the document has version {_abridged(version)}: "
             f"this release of rebt_ros reads the versions {' and '.join(map(str, _ADDED))}."
         )
     fields = place.fields(
@@ -522,7 +522,7 @@ def _node(place: _Place, levels: int) -> nodes.Node:
         return nodes.Inverter(_node(place.fields("type", "child")["child"], levels - 1))
     composite = _COMPOSITES.get(kind)
     if composite is None:
-        raise DocumentError(f"{place.path} has the unknown type {_shown(kind)}.")
+        raise DocumentError(f"{place.path} has the unknown type {_abridged(kind)}.")
     remembering = composite is nodes.Sequence or composite is nodes.Selector
     fields = place.fields("type", "children", optional=("memory",) if remembering else ())
     children = fields["children"].items(lambda child: _node(child, levels - 1), least=1)
@@ -556,7 +556,7 @@ def _condition(place: _Place) -> Condition:
             deciding = fields["deciding"].items(_Place.text)
             return LastActionIs(fields["action"].text(), deciding)
         case unknown:
-            raise DocumentError(f"{place.path} has the unknown type {_shown(unknown)}.")
+            raise DocumentError(f"{place.path} has the unknown type {_abridged(unknown)}.")
 
 
 def _quantity(fields: Mapping[str, _Place]) -> Quantity:
