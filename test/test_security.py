@@ -1,7 +1,7 @@
 """Nothing that comes from outside is run, formats text, or names a file elsewhere.
 
-What bags can do is in test_hostile_bags.py, malformed input of all kinds in test_fuzz.py, and the
-rule that no module evaluates or unpickles data in test_architecture.py.
+What bags can do is in storage/test_hostile_bags.py, malformed input of all kinds in test_fuzz.py,
+and the rule that no module evaluates or unpickles data in test_architecture.py.
 """
 
 from __future__ import annotations

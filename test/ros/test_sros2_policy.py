@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-CHECKOUT: Final = Path(__file__).resolve().parents[1]
+CHECKOUT: Final = Path(__file__).resolve().parents[2]
 POLICY: Final = CHECKOUT / "config" / "sros2_policy.xml"
 
 #: Elements, what may stand in each, and its attributes: policy.xsd of sros2, version 0.2.0.

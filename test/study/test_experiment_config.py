@@ -22,7 +22,7 @@ from rebt_ros.study.simulator.configuration import (
     parse_config,
 )
 
-EXPERIMENTS = Path(__file__).resolve().parents[2] / "shared" / "experiments"
+EXPERIMENTS = Path(__file__).resolve().parents[3] / "shared" / "experiments"
 needs_experiments = pytest.mark.skipif(
     not EXPERIMENTS.is_dir(), reason=f"there is no {EXPERIMENTS}"
 )

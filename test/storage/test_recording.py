@@ -30,7 +30,7 @@ from rebt_ros.storage.recording import (
 from rebt_ros.storage.recording_head import Head, Origin, read_head
 from rebt_ros.storage.recording_rows import LABEL, record_type
 
-CHECKOUT = Path(__file__).resolve().parents[1]
+CHECKOUT = Path(__file__).resolve().parents[2]
 
 
 def written(directory: Path, rows=ROWS) -> Path:

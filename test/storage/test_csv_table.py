@@ -14,7 +14,7 @@ from rebt_ros.errors import InputError
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.csv_table import read_csv
 
-SHARED = Path(__file__).resolve().parents[1].parent / "shared"
+SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.logic.conditions import Literal, PreviousActionIs, Threshold
 
-_DOCS = Path(__file__).resolve().parents[1] / "docs"
+_DOCS = Path(__file__).resolve().parents[2] / "docs"
 ENDINGS = (Status.RUNNING, Status.RUNNING, Status.SUCCESS, Status.FAILURE)
 NUMBERS = (-0.5, 0.0, 0.1, 0.2, 0.3, 0.5, None)
 #: Values of `some.FEATURES`.

@@ -44,7 +44,7 @@ from rebt_ros.study.simulator.configuration import (
 from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, simulate
 from rebt_ros.study.subtree_text import one_line
 
-SHARED = Path(__file__).resolve().parents[2] / "shared"
+SHARED = Path(__file__).resolve().parents[3] / "shared"
 SCITOS = SHARED / "data" / "scitos_g5_24.csv"
 
 SEQUENCE, PARALLEL, PSA = GroupKind.SEQUENCE, GroupKind.PARALLEL, GroupKind.PARALLEL_SELECTOR

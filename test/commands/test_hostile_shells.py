@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-CHECKOUT = Path(__file__).resolve().parents[1]
+CHECKOUT = Path(__file__).resolve().parents[2]
 ROWS = "".join(
     f"{x / 10},{'no' if x % 3 else 'yes'},{'go' if x < 20 else 'turn'}\n" for x in range(40)
 )

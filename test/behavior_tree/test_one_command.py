@@ -18,8 +18,9 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning.attaching import resolve
 from rebt_ros.learning.evaluation import own_history_choices, teacher_forced_choices
+from rebt_ros.learning.named_states import Value
 from rebt_ros.learning.options import PsaChoice
-from rebt_ros.learning.policy import Policy, Value
+from rebt_ros.learning.policy import Policy
 from rebt_ros.logic.conditions import LastActionIs, Literal
 
 GO, GRASP, TURN, WAIT = some.ACTIONS

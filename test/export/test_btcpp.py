@@ -225,7 +225,7 @@ def test_it_is_a_part_of_a_larger_tree_as_the_docs_say() -> None:
     done: list[str] = []
     factory = _factory(learned, done)
     factory.register_behavior_tree_from_text(to_btcpp(learned))
-    page = (Path(__file__).resolve().parents[1] / "docs/export.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs/export.md").read_text(encoding="utf-8")
     [part] = re.findall(r"`(<SubTree [^`]*)`", page)
     factory.register_behavior_tree_from_text(
         f'<root BTCPP_format="4"><BehaviorTree ID="Robot">{part}</BehaviorTree></root>'

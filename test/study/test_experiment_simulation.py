@@ -33,7 +33,7 @@ from rebt_ros.study.simulator.synthetic_robot import (
 )
 from rebt_ros.study.simulator.ticking import Outcome, ticker
 
-EXPERIMENTS = Path(__file__).resolve().parents[2] / "shared" / "experiments"
+EXPERIMENTS = Path(__file__).resolve().parents[3] / "shared" / "experiments"
 
 OUTCOMES = {"S": Outcome.SUCCESS, "F": Outcome.FAILURE, "R": Outcome.RUNNING}
 STATUS = {

@@ -25,7 +25,7 @@ from rebt_ros.study.simulator.configuration import (
 from rebt_ros.study.simulator.configuration_file import format_config
 from rebt_ros.study.simulator.generator import canonical_form, generate_configs
 
-EXPERIMENTS = Path(__file__).resolve().parents[2] / "shared" / "experiments"
+EXPERIMENTS = Path(__file__).resolve().parents[3] / "shared" / "experiments"
 SEEDS = st.integers(-(10**9), 10**9)
 
 

@@ -27,14 +27,12 @@ from lat_examples import (
     rule_lists,
     shown_runs,
 )
+from lat_runs import repeater, run, sequence, steps
 from py_trees.common import Status
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import DEEPEST_TREE
-from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.runtime import TreeRuntime
 from rebt_ros.beyond_the_paper.single_loops import LoopTrees, loop_trees
-from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import LastActionIs, Literal
 from rebt_ros.paper.lat_cycles import CycleStart, remove_cycles
 from rebt_ros.paper.lat_graph import generate_graph
@@ -42,28 +40,6 @@ from rebt_ros.paper.lat_occurrences import Occurrences, Runs
 from rebt_ros.paper.lat_trees import LatTree, LeftOut, gen_lat_trees
 from rebt_ros.paper.rule_trees import build_inv_set
 from rebt_ros.paper.rules import Rule
-
-CONDITIONS = tuple(Feature(f"C_{number}", FeatureKind.BINARY) for number in range(10))
-
-
-def steps(*children: Literal | str | nodes.Node) -> tuple[nodes.Node, ...]:
-    """Conditions by their literals and actions by their labels."""
-    return tuple(
-        nodes.Condition(child)
-        if isinstance(child, Literal)
-        else some.action(child)
-        if isinstance(child, str)
-        else child
-        for child in children
-    )
-
-
-def sequence(*children: Literal | str | nodes.Node) -> nodes.Sequence:
-    return nodes.Sequence(steps(*children), memory=True)
-
-
-def repeater(*children: Literal | str | nodes.Node) -> nodes.Repeater:
-    return nodes.Repeater(steps(*children))
 
 
 def either(*alternatives: tuple[Literal, ...]) -> nodes.Selector:
@@ -321,38 +297,6 @@ def test_what_is_remembered_of_demonstrations_changes_no_tree(
 # --- executed -----------------------------------------------------------------------------------
 
 
-class Script:
-    """A commander whose actions succeed on the tick after the one on which they began."""
-
-    def __init__(self) -> None:
-        self.begun: list[str] = []
-        self.halted: list[str] = []
-        self._running: str | None = None
-
-    def update(self, action: nodes.Action) -> Status:
-        if self._running == action.label:
-            self._running = None
-            return Status.SUCCESS
-        self.begun.append(action.label)
-        self._running = action.label
-        return Status.RUNNING
-
-    def halt(self, action: nodes.Action) -> None:
-        self.halted.append(action.label)
-        self._running = None
-
-
-def run(tree: nodes.Node, *states: set[int]) -> tuple[Script, list[Status]]:
-    """Ticks the tree once per state; a state is the numbers of the conditions that hold."""
-    actions = tuple(dict.fromkeys((*map(some.action, LABELS), *nodes.actions(tree))))
-    learned = LearnedTree(CONDITIONS, actions, tree, some.PROVENANCE)
-    script = Script()
-    runtime = TreeRuntime(learned, script)
-    return script, [
-        runtime.tick([float(number in state) for number in range(10)]).status for state in states
-    ]
-
-
 def test_executed_a_sequence_tests_conditions_when_it_reaches_their_step_and_not_again() -> None:
     (tree,) = subtrees(FIGURE_2)
     # ticks:             A_1 runs  done: A_0  done: A_2  done
@@ -437,7 +381,7 @@ print(gen_lat_trees(followers({one: labels[:n] for n, one in enumerate(labels)})
 
 
 def test_the_trees_do_not_depend_on_the_order_of_sets() -> None:
-    here = Path(__file__).parent
+    here = Path(__file__).parents[1]
     printed = {
         subprocess.run(
             [sys.executable, "-c", IN_ANOTHER_PROCESS],

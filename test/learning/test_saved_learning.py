@@ -30,7 +30,7 @@ from rebt_ros.learning.learning_file import Saved, load_learning, restored, save
 from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
 from rebt_ros.learning.pipeline import learn_from
 
-SHARED = Path(__file__).resolve().parents[1].parent / "shared"
+SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 
 #: Options that differ in what is kept of them.
 OPTIONS = {

@@ -9,8 +9,8 @@ import strategies as some
 from hypothesis import given
 from hypothesis import strategies as st
 from lat_examples import c, followers, rule
+from lat_runs import CONDITIONS, Script, repeater, run, sequence
 from pruned_trees import train
-from test_lat_trees import CONDITIONS, Script, repeater, run, sequence
 
 from rebt_ros.behavior_tree import document, nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Root, Suggestion, SuggestionKind, Unit
