@@ -96,6 +96,14 @@ def everything(history: bool, fine: bool) -> Everything:
     return Everything(states, histories, np.zeros(len(states), dtype=np.int64))
 
 
+def looks_back(tree: nodes.Node) -> bool:
+    """Whether a tree tests what was done before."""
+    return any(
+        isinstance(one.literal.condition, LastActionIs | PreviousActionIs)
+        for one in nodes.conditions(tree)
+    )
+
+
 def where(condition: object, states: Everything) -> np.ndarray:
     match condition:
         case PreviousActionIs(action=action):

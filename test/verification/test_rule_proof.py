@@ -18,8 +18,6 @@ from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.logic.conditions import (
     Difference,
     Interval,
-    LastActionIs,
-    PreviousActionIs,
     Threshold,
 )
 from rebt_ros.verification.proof import Answer, Coverage, ShownRow, check, grid_of, verdicts
@@ -30,13 +28,6 @@ from rebt_ros.verification.sweep import Results, Ticks, remembers, sweep
 #: With REBT_ROS_RULES=N, N times as many pairs of trees and rules.
 MORE = int(os.environ.get("REBT_ROS_RULES", "1"))
 RULES_PER_TREE = 10
-
-
-def _looks_back(tree: nodes.Node) -> bool:
-    return any(
-        isinstance(one.literal.condition, LastActionIs | PreviousActionIs)
-        for one in nodes.conditions(tree)
-    )
 
 
 def _compares(tree: nodes.Node) -> bool:
@@ -60,7 +51,7 @@ def test_answers_are_those_of_brute_force_over_all_cells(
 ) -> None:
     learned = some.learned(tree)
     executed = executable(tree)
-    history = _looks_back(tree) or any(rule.when.looks_back for rule in rules)
+    history = written.looks_back(tree) or any(rule.when.looks_back for rule in rules)
     differs = _compares(tree) or any(rule.when.differs for rule in rules)
     states = written.everything(history, differs)
     done = written.commands(executed, states)
