@@ -49,6 +49,9 @@ _ALONE = 1.5
 #: ... and if the delay is less than half of the time for which an action is held, with a margin.
 #: Who goes to and fro between two places turns round half a run after passing the middle.
 _HALF_A_RUN = 0.45
+#: Where previous actions bring the explanation to this share, without a delay, a task needs memory;
+#: then a delay of half a run or more has to do as much.
+_MUCH_SIMPLER = 1 / 3
 #: The explanation must be smaller by that many standard errors, and by that share.
 _STANDARD_ERRORS, _SHARE = 1.0, 0.1
 #: What takes a leaf or an exception for more than this share of the rows explains nothing.
@@ -102,9 +105,10 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
     about half of the time for which actions are held, or longer: then it takes the delay with the
     smallest explanation by states and previous actions.  For a task that needs memory is hardly
     explained by states alone; but who goes to and fro between two places looks as if the middle
-    told when to turn round, half a way late.  Of neighbours that are equally small it is the one in
-    the middle; if they reach to the longest delay, as where each state follows from the one before,
-    the first of them.
+    told when to turn round, half a way late.  So where previous actions bring the explanation to a
+    third, without a delay, such a delay is only taken if it does as much.  Of neighbours that are
+    equally small it is the one in the middle; if they reach to the longest delay, as where each
+    state follows from the one before, the first of them.
 
     A delay is clear if its explanation is not larger than a third of the rows, and smaller than the
     one without a delay by a tenth and by a standard error, where sizes are counts: of a and b, the
@@ -182,10 +186,16 @@ class _Explanations:
                 return (one,), one is alone
         trials = self._around(alone, FEATURES_ALONE)
         best = _peak(trials)
-        told_apart = best.rows < _HALF_A_RUN * _usual_run(self._table)
-        if told_apart and best.size <= _ALONE * with_previous.size:
+        half_a_run = _HALF_A_RUN * _usual_run(self._table)
+        if best.rows < half_a_run and best.size <= _ALONE * with_previous.size:
             return trials, True
-        return self._around(with_previous, _WITH_PREVIOUS), False
+        trials = self._around(with_previous, _WITH_PREVIOUS)
+        much_simpler = _peak(trials).size <= _MUCH_SIMPLER * with_previous.size
+        if with_previous.size <= _MUCH_SIMPLER * alone.size and not much_simpler:
+            # Half a way late, a task that needs memory seems to need none, and mistakes weigh less:
+            # once each, and not again where they are the previous action.
+            trials = tuple(one for one in trials if one.rows < half_a_run)
+        return trials, False
 
     def _around(self, without: Trial, vocabulary: Vocabulary) -> tuple[Trial, ...]:
         """Delays from all over the range, then closer and closer ones around the best."""

@@ -270,6 +270,15 @@ def test_no_delay_shows_where_people_err_only() -> None:
     assert estimate(erring).rows == 0
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_who_goes_to_and_fro_and_errs_is_not_half_a_way_late(seed: int) -> None:
+    table = joined(*(shuttle(0, 100 * seed + number) for number in range(3)))
+    wrong = np.random.default_rng(seed).random(len(table)) < 0.025
+    chosen = np.where(wrong, LEFT + RIGHT - table.chosen, table.chosen)
+    erring = replace(table, chosen=chosen, previous=previous_actions(chosen, table.demonstration))
+    assert estimate(paced(erring, TENTH // 2)).rows == 0
+
+
 @given(some.tables(max_rows=30))
 def test_little_is_shown_and_nothing_is_found(table: DemonstrationTable) -> None:
     found = estimate(table)
