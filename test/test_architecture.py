@@ -28,7 +28,7 @@ LAYERS: Final = (
     {"ros"},
     {"live"},
     {PACKAGE},  # rebt_ros/__init__.py, the public interface
-    {"offline", "study"},
+    {"offline", "study", "options", "simulation"},
     {"learning", "trial"},
     {"storage", "simulated_robot", "drawing", "beyond_the_paper", "export", "verification"},
     {"paper"},

@@ -97,3 +97,15 @@ def test_dir_and_help_name_what_is_exported() -> None:
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
     assert not hasattr(rebt_ros, "no_such_name")
+
+
+def test_names_that_programs_outside_import_are_those_of_the_rooms() -> None:
+    from rebt_ros.simulation.episode import Episode
+    from rebt_ros.simulation.robot import Robot
+
+    from rebt_ros.options import Use
+
+    assert Use is rebt_ros.Use
+    assert isinstance(rebt_ros.Provenance.uses_last_action, property)
+    assert Episode.__module__ == "rebt_ros.simulated_robot.episode"
+    assert Robot.__module__ == "rebt_ros.simulated_robot.robot"

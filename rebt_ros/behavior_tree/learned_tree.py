@@ -125,6 +125,11 @@ class Provenance:
     late_seconds: float | None = None
     """The same in seconds, where stamps tell the time."""
 
+    @property
+    def uses_last_action(self) -> bool:
+        """Whether the decision tree could test what was done before."""
+        return self.history is not History.NONE
+
 
 @dataclass(frozen=True, slots=True)
 class LearnedTree:
