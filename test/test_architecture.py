@@ -295,23 +295,17 @@ def test_the_core_runs_where_ros_is_not_installed() -> None:
     _run(f"{WITHOUT_ROS} [importlib.import_module(name) for name in {names}]")
 
 
+#: What needs ROS, and what is no command.
+_NO_OFFLINE_COMMANDS: Final = frozenset({"__init__", "asking", "demo", "progress", "shell"})
+
+
 @pytest.mark.parametrize(
     "command",
-    [
-        *(
-            "check",
-            "describe",
-            "experiment",
-            "explain",
-            "export",
-            "generate",
-            "learn",
-            "replay",
-            "revise",
-            "show",
-        ),
-        *("simulate", "trial"),
-    ],
+    sorted(
+        module.name.rpartition(".")[2]
+        for module in MODULES
+        if module.unit == "commands" and module.path.stem not in _NO_OFFLINE_COMMANDS
+    ),
 )
 def test_offline_commands_need_no_ros(command: str) -> None:
     _run(f"{WITHOUT_ROS} importlib.import_module('rebt_ros.commands.{command}')")

@@ -14,9 +14,11 @@ ROWS = "".join(
     f"{x / 10},{'no' if x % 3 else 'yes'},{'go' if x < 20 else 'turn'}\n" for x in range(40)
 )
 COMMANDS = (
+    "check",
     "demo",
     "describe",
     "experiment",
+    "explain",
     "export",
     "generate",
     "learn",
@@ -24,6 +26,7 @@ COMMANDS = (
     "revise",
     "show",
     "simulate",
+    "suggest_rules",
     "trial",
 )
 NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
