@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -44,8 +45,11 @@ class TreeVersions:
             raise StorageError(f"{self._directory} cannot be tidied ({err.strerror}).") from err
         return path
 
-    def go_back(self) -> tuple[Path, str]:
+    def go_back(self, accept: Callable[[str], object] = lambda document: None) -> tuple[Path, str]:
         """Takes the newest one out, which stays as a file, and returns the one before it.
+
+        Args:
+            accept: Raises an error if it does not accept the one before, and nothing is changed.
 
         Raises:
             InputError: There is none before it, or it cannot be read.
@@ -54,6 +58,7 @@ class TreeVersions:
         if len(numbered) < 2:
             raise InputError(f"there is no tree before this one in {self._directory}.")
         document = read_text(numbered[-2])
+        accept(document)
         numbered[-1].rename(numbered[-1].with_suffix(f"{_SUFFIX}{_UNDONE}"))
         return numbered[-2], document
 

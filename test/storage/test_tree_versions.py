@@ -34,3 +34,16 @@ def test_only_the_newest_trees_are_kept(tmp_path: Path) -> None:
     for number in range(10):
         versions.keep(str(number))
     assert sorted(one.read_text() for one in tmp_path.iterdir()) == ["7", "8", "9"]
+
+
+def test_a_tree_before_that_is_not_accepted_changes_nothing(tmp_path: Path) -> None:
+    versions = TreeVersions(tmp_path, 5)
+    versions.keep("one")
+    versions.keep("two")
+
+    def refuse(document: str) -> None:
+        raise InputError(f"{document} breaks a rule.")
+
+    with pytest.raises(InputError, match=r"one breaks a rule\."):
+        versions.go_back(refuse)
+    assert versions.go_back() == (tmp_path / "000001.json", "one")

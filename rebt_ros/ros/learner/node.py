@@ -228,8 +228,10 @@ class LearnerNode(Node):
                 response.message = f"busy: {self._call}; call again when that is done."
                 return response
             try:
-                path, document = self._versions().go_back()
-                learned = self._keeping_rules(loads(document))
+                path, document = self._versions().go_back(
+                    lambda before: self._keeping_rules(loads(before))
+                )
+                learned = loads(document)
                 write_text_atomically(self._settings.output() / _TREE_FILE, document)
             except (RebtError, OSError) as err:
                 response.message = str(err)
