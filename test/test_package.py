@@ -156,8 +156,12 @@ def test_every_entry_point_can_be_loaded() -> None:
 def test_every_node_begins_where_signals_are_heard_at_once() -> None:
     scripts = metadata.distribution(PACKAGE).entry_points.select(group="console_scripts")
     nodes = {one.name for one in scripts if one.value.startswith(f"{PACKAGE}.ros.")}
-    modules = (path.stem.removesuffix("_node") for path in SOURCES if path.stem.endswith("_node"))
-    assert nodes == set(modules)
+    begun = (
+        path
+        for path in SOURCES
+        if path.parent.parent.name == "ros" and "\ndef main(" in path.read_text(encoding="utf-8")
+    )
+    assert nodes == {path.parent.name if path.stem == "node" else path.stem for path in begun}
     assert {one.module for one in scripts if one.name in nodes} == {f"{PACKAGE}.ros.entry"}
 
 
