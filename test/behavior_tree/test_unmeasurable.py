@@ -13,7 +13,7 @@ NUMBERED = Feature("gear", FeatureKind.CATEGORICAL, ("1", "2"))
 NAMED = Feature("held", FeatureKind.CATEGORICAL, ("box", "2"))
 
 
-def tested(feature: Feature, category: str) -> nodes.Node:
+def condition_on(feature: Feature, category: str) -> nodes.Node:
     return nodes.Sequence(
         (nodes.Condition(Literal(HasCategory(feature.name, category))), some.ACTIONS[0])
     )
@@ -21,10 +21,10 @@ def tested(feature: Feature, category: str) -> nodes.Node:
 
 def test_texts_that_are_tested_cannot_be_measured() -> None:
     for tree, expected in (
-        (tested(NUMBERED, "1"), ()),
-        (tested(NAMED, "box"), (NAMED,)),
+        (condition_on(NUMBERED, "1"), ()),
+        (condition_on(NAMED, "box"), (NAMED,)),
         # What is a number can be told from all others, texts among them.
-        (tested(NAMED, "2"), ()),
+        (condition_on(NAMED, "2"), ()),
         (some.ACTIONS[0], ()),
     ):
         assert unmeasurable(some.learned(tree, (NUMBERED, NAMED))) == expected

@@ -345,9 +345,9 @@ def fits(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Rows of each tree that is fitted."""
     rows: list[int] = []
 
-    def counted(table: DemonstrationTable, *, vocabulary: Vocabulary) -> FittedTree:
+    def counted(table: DemonstrationTable, options: FitOptions) -> FittedTree:
         rows.append(len(table))
-        return fit(table, FitOptions(vocabulary=vocabulary))
+        return fit(table, options)
 
     monkeypatch.setattr(reaction_time, "fit", counted)
     return rows
