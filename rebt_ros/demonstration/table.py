@@ -10,7 +10,12 @@ import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
-from rebt_ros.demonstration.last_action import NO_ACTION, last_actions, previous_actions
+from rebt_ros.demonstration.last_action import (
+    NO_ACTION,
+    ActionHistory,
+    last_actions,
+    previous_actions,
+)
 from rebt_ros.demonstration.schema import TRUTH, Feature, FeatureKind
 from rebt_ros.errors import InputError, OptionError
 
@@ -118,6 +123,24 @@ def _stretch(rows: BoolArray) -> BoolArray | slice:
 def _share_kept(count: int, fraction: float) -> int:
     # The tolerance keeps the rounding of, say, 100 * 0.07 from holding out one more.
     return min(max(count - math.ceil(count * fraction - 1e-9), 1), count - 1)
+
+
+def history_at(table: DemonstrationTable, row: int) -> ActionHistory:
+    """What was done before a row, as far as its demonstration tells."""
+
+    def label(code: int) -> str | None:
+        return None if code == NO_ACTION else table.actions[code]
+
+    number = int(table.demonstration[row])
+    start = int(np.searchsorted(table.demonstration, number))
+    history = ActionHistory()
+    before = None if table.before is None else label(int(table.before[number]))
+    if before is not None:
+        history.begin(before)
+    for code in table.chosen[start:row].tolist():
+        history.begin(table.actions[code])
+    history.previous = label(int(table.previous[row]))
+    return history
 
 
 def part_of(table: DemonstrationTable, rows: int) -> DemonstrationTable:

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.decision_tree.fitted import TrainedTree
-from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory
-from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.demonstration.table import DemonstrationTable, history_at
 from rebt_ros.errors import OptionError
 from rebt_ros.learning.attaching import accept
 from rebt_ros.learning.chosen_policy import ChosenPolicy
@@ -41,10 +40,6 @@ class Learning:
     """A sentence if actions were late; no full stop."""
     further: tuple[str, ...] = ()
     """Notes beside those of the report; no full stops."""
-    attached: tuple[str, ...] = ()
-    """Ids of the suggestions that are attached, or `ALL`."""
-    psa_choice: PsaChoice | None = None
-    """What all PSA nodes were turned into; None where they were left."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -59,7 +54,7 @@ class Learning:
     @property
     def options(self) -> LearnOptions:
         """How it was learned, with what is attached by now."""
-        return replace(self.evidence.options, attach=self.attached, psa_choice=self.psa_choice)
+        return self.evidence.options
 
     @property
     def levels(self) -> Levels:
@@ -89,7 +84,7 @@ class Learning:
             plain=replace(tree.learned, provenance=provenance),
             decision_tree=tree.decision_tree,
             policy=replace(self.policy, ccp_alpha=ccp_alpha),
-        )._accepting((), self.psa_choice)
+        )._accepting((), self.options.psa_choice)
 
     def with_attached(self, *ids: str) -> Learning:
         """The policy with further suggestions attached.
@@ -100,7 +95,8 @@ class Learning:
         Raises:
             OptionError: There is no suggestion with such an id.
         """
-        return self._accepting(tuple(dict.fromkeys((*self.attached, *ids))), self.psa_choice)
+        attach = tuple(dict.fromkeys((*self.options.attach, *ids)))
+        return self._accepting(attach, self.options.psa_choice)
 
     def without(self, *ids: str) -> Learning:
         """The policy with suggestions taken off again.
@@ -118,11 +114,11 @@ class Learning:
                 known = f"attached are {', '.join(attached)}" if attached else "none is"
                 raise OptionError(f"suggestion {name!r} is not attached: {known}.")
         kept = tuple(name for name in attached if name not in gone)
-        return self._accepting(kept, self.psa_choice)
+        return self._accepting(kept, self.options.psa_choice)
 
     def resolved(self, choice: PsaChoice | None) -> Learning:
         """The policy with all PSA nodes turned into what is chosen; None leaves them."""
-        return self._accepting(self.attached, choice)
+        return self._accepting(self.options.attach, choice)
 
     def edited(self, edit: Callable[[nodes.Node], nodes.Node]) -> Learning:
         """The policy with a tree that a person changed (see `behavior_tree.paths`).
@@ -154,28 +150,21 @@ class Learning:
         table = self.table
         if not 0 <= row < len(table):
             raise OptionError(f"there is no row {row}: choose one of 0 to {len(table) - 1}.")
-        previous, last = (
-            None if code == NO_ACTION else table.actions[code]
-            for code in (int(table.previous[row]), int(table.last[row]))
-        )
-        history = ActionHistory([] if last is None else [last])
-        history.previous = previous
         values = table.states[row].tolist()
-        (explanation,) = explain(self.learned, values, {table.channel: history}, [table])
+        (explanation,) = explain(
+            self.learned, values, {table.channel: history_at(table, row)}, [table]
+        )
         return explanation
 
-    def _accepting(self, attached: tuple[str, ...], choice: PsaChoice | None) -> Learning:
-        options = replace(self.evidence.options, attach=attached, psa_choice=choice)
-        return replace(
-            learned_as_asked(
-                self.plain,
-                self.decision_tree,
-                self.policy,
-                replace(self.evidence, options=options),
-                late=self.late,
-                further=self.further,
-            ),
-            evidence=self.evidence,
+    def _accepting(self, attach: tuple[str, ...], choice: PsaChoice | None) -> Learning:
+        options = replace(self.options, attach=attach, psa_choice=choice)
+        return learned_as_asked(
+            self.plain,
+            self.decision_tree,
+            self.policy,
+            replace(self.evidence, options=options),
+            late=self.late,
+            further=self.further,
         )
 
 
@@ -211,6 +200,4 @@ def learned_as_asked(
         report,
         late,
         further,
-        options.attach,
-        options.psa_choice,
     )

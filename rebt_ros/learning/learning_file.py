@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.judged_levels import JudgedLevels
 from rebt_ros.learning.learning import Learning, learned_as_asked
 from rebt_ros.learning.levels import Evidence
-from rebt_ros.learning.options import LearnOptions, PsaChoice
+from rebt_ros.learning.options import LearnOptions
 from rebt_ros.logic.conditions import Difference
 from rebt_ros.storage.array_file import read_arrays, write_arrays
 
@@ -114,8 +114,6 @@ def saved(learning: Learning) -> Saved | None:
         "reasons": list(learning.policy.reasons),
         "late": list(learning.late),
         "further": list(learning.further),
-        "attached": list(learning.attached),
-        "psa_choice": None if learning.psa_choice is None else learning.psa_choice.value,
         "options": _plain(asdict(evidence.options)),
         "fitted": _fit_words(evidence.fitted),
         "judge": _fit_words(evidence.judge),
@@ -180,21 +178,14 @@ def _restored(words: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) 
     policy = ChosenPolicy(
         fitted, float(words["ccp_alpha"]), evidence.psa, levels, _texts(words, "reasons")
     )
-    choice = words["psa_choice"]
-    asked = replace(
-        options,
-        attach=_texts(words, "attached"),
-        psa_choice=None if choice is None else PsaChoice(choice),
-    )
-    learning = learned_as_asked(
+    return learned_as_asked(
         plain,
         evidence.decision_tree_at(policy.ccp_alpha),
         policy,
-        replace(evidence, options=asked),
+        evidence,
         late=_texts(words, "late"),
         further=_texts(words, "further"),
     )
-    return replace(learning, evidence=evidence)
 
 
 def _texts(words: Mapping[str, Any], name: str) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.last_action import NO_ACTION
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.demonstration.table import DemonstrationTable, part_of, tabulate
+from rebt_ros.demonstration.table import DemonstrationTable, history_at, part_of, tabulate
 from rebt_ros.errors import InputError, OptionError, RebtError
 
 NUMERIC, BINARY, CATEGORICAL = FeatureKind
@@ -468,3 +468,32 @@ def test_tables_hold_what_was_shown_row_by_row(
         for place, feature in enumerate(table.features):
             values = {row[1][place] for row in everything if not math.isnan(row[1][place])}
             assert feature.kind is (BINARY if values == {0.0, 1.0} else NUMERIC)
+
+
+# --- what was done before a row -------------------------------------------------------------------
+
+
+@given(some.tables())
+def test_the_history_at_a_row_is_what_its_columns_say(table: DemonstrationTable) -> None:
+    def code(label: str | None) -> int:
+        return NO_ACTION if label is None else table.actions.index(label)
+
+    for row in range(len(table)):
+        history = history_at(table, row)
+        assert code(history.previous) == table.previous[row]
+        assert code(history.before(table.actions[table.chosen[row]])) == table.last[row]
+
+
+def test_the_history_at_a_row_reaches_back_to_what_was_before_its_demonstration() -> (
+    None
+):
+    first, second = column([1, 2, 3]), shown("two", [(1,), (2,), (3,)], "bca")
+    [table] = tabulate([first, replace(second, before={"m": "d"}), shown("three", [(0,)], "d")])
+    history = history_at(table, 5)
+    assert history.previous == "c"
+    assert [history.before(*done) for done in (["c"], ["c", "b"], ["c", "b", "d"])] == [
+        "b",
+        "d",
+        None,
+    ]
+    assert history_at(table, 3).previous is None
