@@ -1,27 +1,14 @@
-"""The rules of a node: read from their file, and held against trees."""
+"""The rules of a node, held against trees."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.storage.text import read_text
 from rebt_ros.verification.rules import RuleSet
-from rebt_ros.verification.rules_file import loads
 from rebt_ros.verification.ruling import Ruled, ruled
 from rebt_ros.verification.sweep import Results
-
-
-def read_rules(path: Path) -> RuleSet:
-    """Reads a file of rules.
-
-    Raises:
-        InputError: There is no such text file.
-        RuleError: It is malformed.
-    """
-    return loads(read_text(path), str(path))
 
 
 def kept(

@@ -227,7 +227,8 @@ def _ruled(
         RebtError: The rules cannot be read, or it does not keep them.
     """
     from rebt_ros.learning.replaying import rows_for
-    from rebt_ros.live.keeping_rules import kept, read_rules
+    from rebt_ros.live.keeping_rules import kept
+    from rebt_ros.offline.rules_files import read_rules
     from rebt_ros.verification.errors import RuleError
 
     if not request.rules:

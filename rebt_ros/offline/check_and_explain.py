@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.last_action import ActionHistory
-from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.demonstration.table import DemonstrationTable, history_at
 from rebt_ros.errors import OptionError
 from rebt_ros.learning.replaying import rows_for
-from rebt_ros.storage.inputs import InputOptions, load
-from rebt_ros.storage.text import read_text
-from rebt_ros.storage.tree_file import read_tree
+from rebt_ros.offline.rules_files import read_rules
+from rebt_ros.offline.trees_and_rows import as_learned_tree, demonstrations_for
+from rebt_ros.storage.inputs import InputOptions
 from rebt_ros.verification.comparing import Comparison, compare
-from rebt_ros.verification.contradictions import refuse_contradictions
+from rebt_ros.verification.contradictions import agreeing_demands
 from rebt_ros.verification.explaining import Explanation
 from rebt_ros.verification.explaining import explain as explain_state
 from rebt_ros.verification.findings import Findings, find
 from rebt_ros.verification.proof import Answer, ChannelProof, Verdict, verdicts
 from rebt_ros.verification.proof import check as prove
 from rebt_ros.verification.repairing import Repaired, repair
-from rebt_ros.verification.resolving import demands
 from rebt_ros.verification.rules import RuleSet
-from rebt_ros.verification.rules_file import loads
 from rebt_ros.verification.sweep import Results
 
 
@@ -64,16 +61,6 @@ class Situation:
     """By channel."""
 
 
-def read_rules(path: str | Path) -> RuleSet:
-    """Reads a file of rules.
-
-    Raises:
-        InputError: There is no such text file.
-        RuleError: It is malformed.
-    """
-    return loads(read_text(Path(path)), str(path))
-
-
 def check(
     tree: LearnedTree | str | Path,
     rules: RuleSet | str | Path | None = None,
@@ -96,11 +83,9 @@ def check(
     Raises:
         RebtError: A file cannot be used, or rules do not fit the tree or each other.
     """
-    learned = _learned(tree)
+    learned = as_learned_tree(tree)
     ruled = rules if isinstance(rules, RuleSet) or rules is None else read_rules(rules)
-    asked = () if ruled is None else demands(ruled, learned)
-    if ruled is not None:
-        refuse_contradictions(ruled.source, asked, learned)
+    asked = () if ruled is None else agreeing_demands(ruled, learned)
     tables = _rows(learned, inputs, reading)
     proofs = prove(learned, asked, tables, results)
     return Checked(
@@ -108,7 +93,7 @@ def check(
         proofs,
         verdicts(proofs, asked),
         find(learned, tables, results),
-        () if against is None else compare(learned, _learned(against), tables),
+        () if against is None else compare(learned, as_learned_tree(against), tables),
         tables,
         results,
     )
@@ -144,7 +129,7 @@ def explain(
     Raises:
         RebtError: A file cannot be used.
     """
-    learned = _learned(tree)
+    learned = as_learned_tree(tree)
     return explain_state(learned, values, histories, _rows(learned, inputs, reading))
 
 
@@ -188,24 +173,11 @@ def row_of(
             raise OptionError(f"{wanted} has {len(mine)} rows, from 0: there is no row {row}.")
         place = int(mine[row])
         values = tuple(table.states[place].tolist())
-        done = [table.actions[code] for code in table.chosen[mine[:row]].tolist()]
-        histories[table.channel] = ActionHistory(done)
+        histories[table.channel] = history_at(table, place)
     return Situation(values, histories)
-
-
-def _learned(tree: LearnedTree | str | Path) -> LearnedTree:
-    return tree if isinstance(tree, LearnedTree) else read_tree(Path(tree))
 
 
 def _rows(
     learned: LearnedTree, inputs: Sequence[str | Path], reading: InputOptions | None
 ) -> tuple[DemonstrationTable, ...]:
-    if not inputs:
-        return ()
-    reading = reading or InputOptions()
-    names = frozenset(feature.name for feature in learned.features)
-    policies = tuple(nodes.policies(learned.tree))
-    reading = replace(reading, features=reading.features | names)
-    if len(policies) > 1:
-        reading = replace(reading, channels=reading.channels or policies)
-    return rows_for(learned, load(tuple(map(Path, inputs)), reading).demonstrations)
+    return rows_for(learned, demonstrations_for(learned, inputs, reading)) if inputs else ()

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
-from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.learning.replaying import Replay
 from rebt_ros.learning.replaying import replay as replay_demonstrations
-from rebt_ros.storage.inputs import InputOptions, as_paths, holds_bags, load
-from rebt_ros.storage.tree_file import read_tree
+from rebt_ros.offline.trees_and_rows import as_learned_tree, demonstrations_for
+from rebt_ros.storage.inputs import InputOptions
 
 
 def replay(
@@ -34,14 +32,5 @@ def replay(
     Raises:
         RebtError: The tree or an input cannot be used, or they do not fit each other.
     """
-    learned = tree if isinstance(tree, LearnedTree) else read_tree(Path(tree))
-    reading = reading or InputOptions()
-    names = frozenset(feature.name for feature in learned.features)
-    reading = replace(reading, features=reading.features | names)
-    paths = as_paths(inputs)
-    if learned.robot is not None and reading.robot is None and holds_bags(paths):
-        reading = replace(reading, robot=learned.robot)
-    policies = tuple(nodes.policies(learned.tree))
-    if len(policies) > 1:
-        reading = replace(reading, channels=reading.channels or policies)
-    return replay_demonstrations(learned, load(paths, reading).demonstrations)
+    learned = as_learned_tree(tree)
+    return replay_demonstrations(learned, demonstrations_for(learned, inputs, reading))

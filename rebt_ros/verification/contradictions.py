@@ -12,29 +12,41 @@ from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.formulas import AllOf, Formula
 from rebt_ros.verification.proof import grid_of
 from rebt_ros.verification.reference import of_tree
-from rebt_ros.verification.rules import Demand
+from rebt_ros.verification.resolving import demands
+from rebt_ros.verification.rules import Demand, RuleSet
 from rebt_ros.verification.states import Point, Unsettled, nearest
 
 
-def refuse_contradictions(source: str, demands: Sequence[Demand], learned: LearnedTree) -> None:
+def agreeing_demands(rules: RuleSet, learned: LearnedTree) -> tuple[Demand, ...]:
+    """What rules demand of a tree.
+
+    Raises:
+        RuleError: They do not fit the tree, or contradict each other.
+    """
+    asked = demands(rules, learned)
+    refuse_contradictions(rules.source, asked, learned)
+    return asked
+
+
+def refuse_contradictions(source: str, asked: Sequence[Demand], learned: LearnedTree) -> None:
     """Refuses rules of which no tree can keep all, and rules about no state at all.
 
     Args:
         source: Name of the file of rules, for the message.
-        demands: The rules.
+        asked: The rules.
         learned: A tree that knows their features and actions; what it does does not matter.
 
     Raises:
         RuleError: It names both rules, and a state in which they contradict each other.
     """
-    for demand in demands:
+    for demand in asked:
         with contextlib.suppress(Unsettled):
             if _state_of(demand.when, demand, learned) is None:
                 raise RuleError(
                     f"{source}, {demand.rule.place}: the condition of '{demand.rule}' never "
                     "holds: no state is like that."
                 )
-    for first, second in combinations(demands, 2):
+    for first, second in combinations(asked, 2):
         with contextlib.suppress(Unsettled):
             _refuse_clash(source, first, second, learned)
 

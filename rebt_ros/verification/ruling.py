@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.verification.contradictions import refuse_contradictions
+from rebt_ros.verification.contradictions import agreeing_demands
 from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.proof import check, verdicts
 from rebt_ros.verification.repairing import repair
-from rebt_ros.verification.resolving import demands
 from rebt_ros.verification.rules import RuleSet
 from rebt_ros.verification.sweep import Results
 from rebt_ros.verification.verdict_text import what_breaks
@@ -46,8 +45,7 @@ def ruled(
     Raises:
         RuleError: It does not keep a rule, or the rules do not fit it.
     """
-    asked = demands(rules, learned)
-    refuse_contradictions(rules.source, asked, learned)
+    asked = agreeing_demands(rules, learned)
     proofs = check(learned, asked, tables, results)
     broken = what_breaks(learned, proofs, verdicts(proofs, asked))
     if not broken:

@@ -19,6 +19,7 @@ from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.errors import InputError, OptionError, RebtError
+from rebt_ros.offline.check_and_explain import check, row_of
 from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.storage.inputs import InputOptions, load
 from rebt_ros.storage.robot_bag import read_robot_bag
@@ -230,3 +231,13 @@ def test_bad_messages_are_refused_or_counted(tmp_path: Path) -> None:
     read = read_robot_bag(bag, ROBOT, skip_bad=True)
     assert read.account is not None
     assert read.account.left_out == {"cannot be used": 1}
+
+
+def test_a_tree_that_says_where_its_features_are_is_checked_and_explained_by_a_bag(
+    tmp_path: Path,
+) -> None:
+    bag = some.write_bag(tmp_path / "bag", some.shown())
+    learned = rebt_ros.learn([bag], reading=InputOptions(robot=ROBOT)).learned
+    [rows] = check(learned, inputs=[bag]).rows
+    assert rows.features == learned.features
+    assert row_of(learned, 1, None, [bag]).values == tuple(rows.states[1].tolist())

@@ -17,8 +17,9 @@ from rebt_ros.behavior_tree.novelty import NoveltyDetector
 from rebt_ros.behavior_tree.runtime import Commander, TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError
-from rebt_ros.live.keeping_rules import kept, read_rules
+from rebt_ros.live.keeping_rules import kept
 from rebt_ros.live.tree_inputs import TreeInputs
+from rebt_ros.offline.rules_files import read_rules
 from rebt_ros.ros.command_channels import topic_of
 from rebt_ros.ros.executor.settings import ExecutorSettings
 from rebt_ros.verification.errors import RuleError

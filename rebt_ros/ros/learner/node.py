@@ -19,7 +19,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.errors import RebtError
-from rebt_ros.live.keeping_rules import kept, read_rules
+from rebt_ros.live.keeping_rules import kept
 from rebt_ros.live.learning_process import (
     LearningCancelledError,
     LearningError,
@@ -27,6 +27,7 @@ from rebt_ros.live.learning_process import (
     Lesson,
     Progress,
 )
+from rebt_ros.offline.rules_files import read_rules
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
 from rebt_ros.ros.graph_watch import GraphWatch
