@@ -15,7 +15,6 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -146,13 +145,10 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
         RebtError: They cannot be used, or an option makes no sense.
     """
     from rebt_ros.behavior_tree.document import dumps
-    from rebt_ros.behavior_tree.learned_tree import Root
-    from rebt_ros.decision_tree.upsampling import Upsampling
-    from rebt_ros.demonstration.last_action import History
     from rebt_ros.demonstration.schema import FeatureKind
     from rebt_ros.demonstration.table import tabulate
     from rebt_ros.learning import pipeline
-    from rebt_ros.learning.options import LearnOptions, Use
+    from rebt_ros.learning.options import LearnOptions
     from rebt_ros.offline.result import OfflineLearning
     from rebt_ros.storage.recording import read_recording, recordings
 
@@ -163,18 +159,7 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
         **dict.fromkeys(request.binary_features, FeatureKind.BINARY),
         **dict.fromkeys(request.categorical_features, FeatureKind.CATEGORICAL),
     }
-    kinds: dict[str, type[Enum]] = {
-        "root": Root,
-        "psa": Use,
-        "history": History,
-        "differences": Use,
-        "upsample": Upsampling,
-    }
-    chosen: dict[str, Any] = {
-        name: kinds[name](value) if name in kinds and value is not None else value
-        for name, value in request.options.items()
-    }
-    options = LearnOptions(**chosen)
+    options = LearnOptions(**request.options)
     paths = recordings(Path(request.demonstrations))
     reads = []
     for place, path in enumerate(paths):

@@ -7,7 +7,7 @@ receives, so that the same messages give the same rows.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -88,20 +88,10 @@ def read_bag(
             *((action, ACTION_TYPE) for action in actions),
         }
         feed = Feed(path, builder, skip_bad, {name: bag.found[name, STATE_TYPE] for name in states})
-        rows = (row for message in messages_of(path, bag, wanted) for row in feed.rows_of(*message))
-        first = next(rows, None)
-        if first is None or builder.features is None:
-            with with_notes(bag):
-                raise InputError(f"{path} gives no rows: {feed.why_no_rows(states, actions)}.")
-        demonstration = Demonstration.from_rows(
-            path.absolute().name,
-            builder.features,
-            chain((first,), rows),
-            RowKind.EVENT if sample_rate is None else RowKind.SAMPLE,
+        demonstration = feed.demonstration(
+            bag, messages_of(path, bag, wanted), (*states, *actions), sample_rate
         )
-        stated = sum(bag.stated.get(topic, bag.found[topic]) for topic in wanted)
-        notes = (*bag.notes, *differences(bag, wanted), *feed.notes())
-    return Read(demonstration, tuple(map(printable, notes)), feed.account(stated, demonstration))
+        return feed.read(bag, wanted, demonstration)
 
 
 @dataclass(slots=True)
@@ -128,6 +118,45 @@ class Feed:
     """Stamp of another one."""
     bad: list[str] = field(default_factory=list)
     """What was wrong with the messages that were left out."""
+
+    def demonstration(
+        self,
+        bag: BagFiles,
+        messages: Iterator[Message],
+        topics: Sequence[str],
+        sample_rate: float | None,
+    ) -> Demonstration:
+        """The rows that messages give.
+
+        Args:
+            bag: Where they are from.
+            messages: Those of the topics.
+            topics: In the order in which a person should look for what is missing.
+            sample_rate: Rows per second and channel while an action holds; None: one row per
+                action.
+
+        Raises:
+            InputError: There are no rows, or a message cannot be used.
+        """
+        rows = (row for message in messages for row in self.rows_of(*message))
+        first = next(rows, None)
+        if first is None or self.builder.features is None:
+            with with_notes(bag):
+                raise InputError(f"{self.path} gives no rows: {self.why_no_rows(topics)}.")
+        return Demonstration.from_rows(
+            self.path.absolute().name,
+            self.builder.features,
+            chain((first,), rows),
+            RowKind.EVENT if sample_rate is None else RowKind.SAMPLE,
+        )
+
+    def read(self, bag: BagFiles, wanted: set[Topic], demonstration: Demonstration) -> Read:
+        """A demonstration with the notes on it, and its account."""
+        stated = sum(bag.stated.get(topic, bag.found[topic]) for topic in wanted)
+        notes = (*bag.notes, *differences(bag, wanted), *self.notes())
+        return Read(
+            demonstration, tuple(map(printable, notes)), self.account(stated, demonstration)
+        )
 
     def rows_of(self, topic: Topic, stamp: int, data: bytes) -> tuple[Row, ...]:
         """The rows that a message completes; none where it is left out.
@@ -240,9 +269,9 @@ class Feed:
             "use_sim_time without /clock"
         )
 
-    def why_no_rows(self, states: Sequence[str], actions: Sequence[str]) -> str:
+    def why_no_rows(self, topics: Sequence[str]) -> str:
         """Why there are no rows, and what helps."""
-        for topic in (*states, *actions):
+        for topic in topics:
             if not self.seen[topic]:
                 return f"there is no message on {topic!r}; record it together with the others"
         if self.early:
@@ -404,6 +433,18 @@ def kinds_of(bag: BagFiles) -> dict[str, dict[str, int]]:
     return kinds
 
 
+def listed(kinds: Mapping[str, Mapping[str, int]]) -> str:
+    """The topics that `kinds_of` gives, for a message."""
+    topics = ", ".join(f"{topic} ({', '.join(its)})" for topic, its in kinds.items())
+    return shorten(topics, _LONGEST_LIST, placeholder=" ...")
+
+
+def named(topics: Collection[str], name: str) -> str | None:
+    """The topic of a name, with or without its leading slash; None where there is none."""
+    by_name = {topic.lstrip("/"): topic for topic in topics} | {topic: topic for topic in topics}
+    return by_name.get(name) or by_name.get(name.lstrip("/"))
+
+
 def _chosen(
     path: Path,
     kinds: dict[str, dict[str, int]],
@@ -421,19 +462,14 @@ def _chosen(
             f"{path} has {len(candidates)} topics of type {kind} ({', '.join(candidates)}): "
             f"say which of them is the {role} topic."
         )
-    there = shorten(
-        ", ".join(f"{topic} ({', '.join(its)})" for topic, its in kinds.items()),
-        _LONGEST_LIST,
-        placeholder=" ...",
-    )
+    there = listed(kinds)
     if not names:
         raise InputError(
             f"{path} has no {role} topic: record one of type {kind}; there is {there}."
         )
-    by_name = {topic.lstrip("/"): topic for topic in kinds} | {topic: topic for topic in kinds}
     topics = []
     for name in names:
-        topic = by_name.get(name) or by_name.get(name.lstrip("/"))
+        topic = named(kinds, name)
         if topic is None:
             raise InputError(f"{path} has no messages on {role} topic {name!r}: there is {there}.")
         if kind not in kinds[topic]:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import chain
 from pathlib import Path
-from textwrap import shorten
 from typing import Final
 
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder
-from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
-from rebt_ros.errors import InputError, printable
+from rebt_ros.demonstration.demonstration import Row
+from rebt_ros.errors import InputError
 from rebt_ros.robot_file.binding import BoundTopic, bind
 from rebt_ros.robot_file.features import Categories, FeatureReader, described, state_topics_of
 from rebt_ros.robot_file.robot_file import RobotFile
@@ -21,9 +19,10 @@ from rebt_ros.storage.bag import (
     Feed,
     LateError,
     UndecodableError,
-    differences,
     kinds_of,
+    listed,
     messages_of,
+    named,
     unpacked,
     with_notes,
 )
@@ -34,8 +33,6 @@ from rebt_ros.storage.read import Read
 #: The stamp of a header, behind the four bytes that messages begin with.
 _STAMPS: Final = {b"\0\1": struct.Struct("<iI"), b"\0\0": struct.Struct(">iI")}
 _HEAD: Final = 4
-#: Longest list of topics in a sentence (characters).
-_LONGEST_LIST: Final = 500
 
 
 def read_robot_bag(
@@ -87,23 +84,11 @@ def read_robot_bag(
         feed = _RobotFeed(
             path, builder, skip_bad, there, decoders=decoders, topics=wanted, readers=readers
         )
-        messages = _in_order(path, bag, wanted)
-        rows = (row for message in messages for row in feed.rows_of(*message))
-        first = next(rows, None)
-        if first is None or builder.features is None:
-            with with_notes(bag):
-                why = feed.why_no_rows([name for name, _ in wanted], ())
-                raise InputError(f"{path} gives no rows: {why}.")
-        shown = Demonstration.from_rows(
-            path.absolute().name,
-            builder.features,
-            chain((first,), rows),
-            RowKind.EVENT if sample_rate is None else RowKind.SAMPLE,
+        shown = feed.demonstration(
+            bag, _in_order(path, bag, wanted), [name for name, _ in wanted], sample_rate
         )
         shown = replace(shown, features=described(shown.features, states, categories))
-        stated = sum(bag.stated.get(topic, bag.found[topic]) for topic in wanted)
-        notes = (*bag.notes, *differences(bag, set(wanted)), *feed.notes())
-    return Read(shown, tuple(map(printable, notes)), feed.account(stated, shown), robot=robot)
+        return replace(feed.read(bag, set(wanted), shown), robot=robot)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -149,18 +134,13 @@ def _chosen(
     Raises:
         InputError: The bag has no messages on one of them, or messages of several types.
     """
-    there = shorten(
-        ", ".join(f"{topic} ({', '.join(its)})" for topic, its in kinds.items()),
-        _LONGEST_LIST,
-        placeholder=" ...",
-    )
-    by_name = {topic.lstrip("/"): topic for topic in kinds} | {topic: topic for topic in kinds}
     chosen: dict[Topic, str] = {}
     for name in dict.fromkeys((*robot.state_topics, *robot.action_topics)):
-        topic = by_name.get(name) or by_name.get(name.lstrip("/"))
+        topic = named(kinds, name)
         if topic is None:
             raise InputError(
-                f"{path} has no messages on {name!r}, which {robot.name} names: there is {there}."
+                f"{path} has no messages on {name!r}, which {robot.name} names: there is "
+                f"{listed(kinds)}."
             )
         declared = robot.settings_of(name).kind
         if len(kinds[topic]) > 1 and declared not in kinds[topic]:

@@ -484,9 +484,7 @@ def test_the_history_at_a_row_is_what_its_columns_say(table: DemonstrationTable)
         assert code(history.before(table.actions[table.chosen[row]])) == table.last[row]
 
 
-def test_the_history_at_a_row_reaches_back_to_what_was_before_its_demonstration() -> (
-    None
-):
+def test_the_history_at_a_row_reaches_back_to_what_was_before_its_demonstration() -> None:
     first, second = column([1, 2, 3]), shown("two", [(1,), (2,), (3,)], "bca")
     [table] = tabulate([first, replace(second, before={"m": "d"}), shown("three", [(0,)], "d")])
     history = history_at(table, 5)
