@@ -51,5 +51,9 @@ class OptionError(RebtError):
     """An option or parameter has a value that makes no sense."""
 
 
+class MessagePathError(RebtError):
+    """A message path is malformed or leads to nothing in the messages of its topic."""
+
+
 class DocumentError(RebtError):
     """A behavior tree document is malformed or does not fit where it should run."""

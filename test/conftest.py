@@ -20,8 +20,15 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# A slow machine is no failure, and the first example pays for imports.
-settings.register_profile("rebt_ros", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# A slow machine is no failure, and the first example pays for imports.  A change is judged by the
+# same examples wherever it is tested; pytest --hypothesis-profile search looks for others.
+settings.register_profile(
+    "rebt_ros",
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.register_profile("search", settings.get_profile("rebt_ros"), derandomize=False)
 settings.load_profile("rebt_ros")
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rebt_ros.arrays import IntArray
+from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.behavior_tree import document
 from rebt_ros.behavior_tree.nodes import Action
 from rebt_ros.beyond_the_paper.reductions import Reductions
@@ -20,6 +20,7 @@ from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.grown import GrownTree
 from rebt_ros.decision_tree.pruning import pruning_path
 from rebt_ros.demonstration.last_action import NO_ACTION, History
+from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import InputError, RebtError
 from rebt_ros.learning.chosen_policy import ChosenPolicy
@@ -277,6 +278,13 @@ def _check_table(table: DemonstrationTable) -> None:
     ):
         if codes.shape != (rows,) or not _within(codes, least, count):
             raise ValueError(f"{name} are out of range")
+    for feature, column in zip(table.features, table.states.T, strict=True):
+        codes = column[~np.isnan(column)]
+        end = {FeatureKind.BINARY: 2, FeatureKind.CATEGORICAL: len(feature.categories)}
+        if feature.kind in end and not (
+            (codes % 1 == 0).all() and _within(codes, 0, end[feature.kind])
+        ):
+            raise ValueError(f"values of {feature.name} are out of range")
     if table.stamps.shape != (rows,) or (np.diff(table.demonstration) < 0).any():
         raise ValueError("rows are not in order")
 
@@ -298,5 +306,5 @@ def _check_tree(grown: GrownTree, width: int, actions: int) -> None:
         raise ValueError("a decision tree compares what there is not")
 
 
-def _within(codes: IntArray, least: int, end: int) -> bool:
+def _within(codes: IntArray | FloatArray, least: int, end: int) -> bool:
     return not len(codes) or (int(codes.min()) >= least and int(codes.max()) < end)

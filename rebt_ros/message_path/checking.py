@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Final, NoReturn, TypeAlias
 
+from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.definition import Definitions, Field, MessageType, Primitive
-from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.message_path.functions import (
     ANGLES,
     ARITHMETIC,

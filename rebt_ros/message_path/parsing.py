@@ -6,7 +6,7 @@ import math
 import re
 from typing import Final, NoReturn
 
-from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.path import (
     PLAIN_NAME,
     PLAIN_TOPIC,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.checking import CheckedPath, check
 from rebt_ros.message_path.compiling import wanted_of
 from rebt_ros.message_path.definition import Definitions, Primitive
-from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.robot_file.errors import RobotFileError
 from rebt_ros.robot_file.labelling import Labeller, labeller
 from rebt_ros.robot_file.robot_file import RobotFile, Stamp, StateFeature

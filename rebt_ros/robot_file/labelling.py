@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Protocol, TypeAlias
 
+from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.checking import check
 from rebt_ros.message_path.compiling import Value, getter, wanted_of
 from rebt_ros.message_path.definition import Definitions, Primitive
-from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.robot_file.robot_file import (
     ActionSource,
     AxisLabels,

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from rebt_ros.demonstration.schema import FeatureKind
-from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.parsing import parse
 from rebt_ros.message_path.path import PLAIN_TOPIC, MessagePath
 from rebt_ros.robot_file.errors import RobotFileError

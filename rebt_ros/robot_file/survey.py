@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.checking import check
 from rebt_ros.message_path.compiling import Getter, getter
 from rebt_ros.message_path.definition import Definitions, Field, MessageType, Primitive
-from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.message_path.parsing import parse
 from rebt_ros.message_path.path import Entry, FieldName, Function, Index, MessagePath, Part
 

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.utilities import try_shutdown
 
-from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.errors import MessagePathError
 from rebt_ros.robot_file.survey import TopicSurvey
 from rebt_ros.ros.message_types import installed, message_class
 

@@ -9,8 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
+from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.definition import FILLER, Field, MessageType, Primitive
-from rebt_ros.message_path.errors import MessagePathError
 
 #: Package and name of a type.
 _NAME: Final = re.compile(r"([a-z][a-z0-9_]*)/(?:(msg|srv|action)/)?([A-Za-z]\w*)", re.ASCII)

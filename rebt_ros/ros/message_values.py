@@ -6,7 +6,7 @@ import re
 from array import array
 from typing import Any, Final
 
-from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.errors import MessagePathError
 from rebt_ros.robot_file.place import Place
 from rebt_ros.ros.message_types import message_class
 

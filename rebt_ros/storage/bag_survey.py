@@ -6,8 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Final
 
-from rebt_ros.errors import InputError
-from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.errors import InputError, MessagePathError
 from rebt_ros.robot_file.survey import TopicSurvey
 from rebt_ros.storage.bag import kinds_of, messages_of, unpacked
 from rebt_ros.storage.bag_files import GAP, Topic, opened_bag

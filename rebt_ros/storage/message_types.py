@@ -10,8 +10,8 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.base import normalize_fieldname
 
+from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.definition import FILLER, Field, MessageType, Primitive
-from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.storage.message_definitions import Definitions, is_known, parse_definitions
 from rebt_ros.storage.partial_messages import Attributes, PartialDecoder
 

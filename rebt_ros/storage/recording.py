@@ -18,10 +18,10 @@ from types import TracebackType
 from typing import Final
 
 from rebt_ros.demonstration.builder import LARGEST_VALUE, is_label
+from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError
-from rebt_ros.robot_file.features import Categories
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.atomic import StorageError, sync_directory
 from rebt_ros.storage.read import Read

@@ -31,10 +31,10 @@ from numpy.typing import NDArray
 
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.demonstration.builder import LARGEST_VALUE, is_label
+from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.demonstration import Demonstration, Row, in_sorted_order
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError
-from rebt_ros.robot_file.features import Categories
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording_head import Head

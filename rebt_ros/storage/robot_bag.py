@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Final
 
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder
+from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.errors import InputError
 from rebt_ros.robot_file.binding import BoundTopic, bind
-from rebt_ros.robot_file.features import Categories, FeatureReader, described, state_topics_of
+from rebt_ros.robot_file.features import FeatureReader, described, state_topics_of
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.bag import (
     LATEST,

@@ -16,10 +16,11 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import BatteryState, Joy
 from std_msgs.msg import Bool, String
 
+from rebt_ros.demonstration.categories import MOST_CATEGORIES, Categories
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.robot_file.binding import BoundTopic, bind
 from rebt_ros.robot_file.errors import RobotFileError
-from rebt_ros.robot_file.features import MOST_CATEGORIES, Categories, FeatureReader
+from rebt_ros.robot_file.features import FeatureReader
 from rebt_ros.robot_file.labelling import LogLabeller
 from rebt_ros.robot_file.reading import (
     json_schema,

@@ -83,7 +83,7 @@ def test_a_recorder_is_not_ready_before_simulated_time_is(
         peer.connect(String, "action")
         peer.state(0.0)
         _warns(peer, "recorder", "waiting for /clock")
-        assert [one.data for one in said] == [False]
+        peer.wait_until(lambda: [one.data for one in said] == [False])
 
         def ready() -> bool:
             peer.publish(Clock(clock=Time(sec=5)), "/clock")

@@ -12,7 +12,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from rebt_ros.demonstration.schema import FeatureKind
-from rebt_ros.message_path.errors import MessagePathError
+from rebt_ros.errors import MessagePathError
 from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.storage.bag_survey import survey_bag
 from rebt_ros.storage.message_definitions import parse_definitions

@@ -12,10 +12,10 @@ import robot_bags as some
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError
-from rebt_ros.robot_file.features import Categories
 from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.storage.recording import RecordingWriter, read_recording
 from rebt_ros.storage.recording_head import MARK

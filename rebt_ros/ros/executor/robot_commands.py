@@ -9,8 +9,8 @@ from py_trees.common import Status
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
 
+from rebt_ros.errors import MessagePathError
 from rebt_ros.live.long_command import NOTHING, LongCommand, Running
-from rebt_ros.message_path.errors import MessagePathError
 from rebt_ros.robot_file.errors import RobotFileError
 from rebt_ros.robot_file.place import Place
 from rebt_ros.robot_file.robot_file import (

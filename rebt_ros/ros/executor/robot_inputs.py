@@ -7,10 +7,11 @@ from typing import Any, Final
 
 from rclpy.node import Node
 
+from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.live.tree_inputs import Message, TreeInputs
 from rebt_ros.robot_file.binding import BoundTopic
-from rebt_ros.robot_file.features import Categories, FeatureReader
+from rebt_ros.robot_file.features import FeatureReader
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.ros.graph_watch import Finding
 from rebt_ros.ros.robot_files import RobotTopics

@@ -19,6 +19,7 @@ from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
+from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.fields import names_of, values_of
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
@@ -27,7 +28,7 @@ from rebt_ros.live.losses import Losses
 from rebt_ros.live.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
 from rebt_ros.live.state_streams import StateStreams
 from rebt_ros.robot_file.binding import BoundTopic
-from rebt_ros.robot_file.features import Categories, FeatureReader, described
+from rebt_ros.robot_file.features import FeatureReader, described
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
