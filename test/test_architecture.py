@@ -37,7 +37,7 @@ LAYERS: Final = (
     {"robot_file"},
     {"demonstration"},
     {"logic", "message_path"},
-    {"errors", "arrays", "streams"},
+    {"errors", "arrays", "streams", "codec"},
 )
 DEPTH: Final = {unit: depth for depth, units in enumerate(LAYERS) for unit in units}
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Annotated
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.shown import ShownChannel, problems
+from rebt_ros.codec.bounds import Bounds, Count, Share
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, number_of
@@ -55,7 +57,7 @@ class Suggestion:
 
     id: str
     kind: SuggestionKind
-    support: int
+    support: Count
     """How much of the demonstrations shows it, in the unit of its kind."""
     subtree: nodes.Node
     attached: bool = False
@@ -82,14 +84,14 @@ class Root(Enum):
 class Figures:
     """How well the tree does; agreements are None where no row was held out for them."""
 
-    fidelity_mismatches: int
+    fidelity_mismatches: Count
     """Rows, of all there were, on which the tree differs from its decision tree."""
-    teacher_forced_agreement: float | None
+    teacher_forced_agreement: Share | None
     """Share of held-out rows on which it agrees, after what the demonstrator did before."""
-    own_history_agreement: float | None
+    own_history_agreement: Share | None
     """Share of held-out rows on which it agrees, after its own earlier choices."""
-    held_out_rows: int
-    mean_recall: float | None = None
+    held_out_rows: Count
+    mean_recall: Share | None = None
     """Mean, over the actions of the held-out rows, of the share of each one's rows on which the
     tree takes it, after its own earlier choices."""
 
@@ -99,8 +101,8 @@ class ChannelProvenance:
     """Where the policy of one channel came from, if there are several."""
 
     channel: str
-    rows: int
-    ccp_alpha: float
+    rows: Count
+    ccp_alpha: Annotated[float, Bounds(0)]
     history: History
     figures: Figures
 
@@ -109,20 +111,20 @@ class ChannelProvenance:
 class Provenance:
     """Where a tree came from; with several channels, figures are over all of them."""
 
-    demonstrations: int
-    rows: int
-    delta: float
-    max_depth: int | None
-    ccp_alpha: float
+    demonstrations: Count
+    rows: Count
+    delta: Share
+    max_depth: Annotated[int, Bounds(1)] | None
+    ccp_alpha: Annotated[float, Bounds(0)]
     root: Root
     history: History
     """What the decision tree could test of what was done before; of several channels, any one."""
     figures: Figures
     channels: tuple[ChannelProvenance, ...] = ()
     """Of each channel, where there are several."""
-    late_rows: int = 0
+    late_rows: Count = 0
     """How late the demonstrator acted: actions were learned as of so many rows before."""
-    late_seconds: float | None = None
+    late_seconds: Annotated[float, Bounds(0)] | None = None
     """The same in seconds, where stamps tell the time."""
 
     @property

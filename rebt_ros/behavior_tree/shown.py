@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
+from rebt_ros.codec.bounds import Bounds, Count
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 
 #: Leaves of a channel in a document; neighbouring ones share their ranges where there are more.
@@ -34,7 +35,7 @@ ShownValues: TypeAlias = Span | tuple[str, ...] | None
 class ShownLeaf:
     """The rows of one leaf, or of neighbouring ones."""
 
-    rows: int
+    rows: Count
     values: tuple[ShownValues, ...]
     """In the order of the learned tree's features."""
 
@@ -44,7 +45,7 @@ class ShownChannel:
     """What was shown on one channel."""
 
     channel: str
-    leaves: tuple[ShownLeaf, ...]
+    leaves: Annotated[tuple[ShownLeaf, ...], Bounds(most=MOST_SHOWN_LEAVES)]
 
 
 def problems(shown: Sequence[ShownChannel], features: Sequence[Feature]) -> Iterator[str]:

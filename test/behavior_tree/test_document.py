@@ -6,6 +6,7 @@ import copy
 import json
 import struct
 from collections.abc import Callable, Iterator
+from importlib import resources
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
+from rebt_ros import behavior_tree
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import (
     DEEPEST_TREE,
@@ -32,6 +34,7 @@ from rebt_ros.behavior_tree.learned_tree import (
     SuggestionKind,
 )
 from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
+from rebt_ros.codec.text import indented
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.errors import DocumentError
@@ -165,6 +168,12 @@ def test_ends_of_intervals_keep_every_bit(quantity: Quantity, between: list[floa
 
 def test_the_schema_is_one() -> None:
     Draft202012Validator.check_schema(json_schema())
+
+
+def test_the_schema_that_is_installed_is_the_one_that_the_forms_give() -> None:
+    shipped = resources.files(behavior_tree).joinpath("behavior_tree.schema.json")
+    generated = indented(json_schema()) + "\n"
+    assert shipped.read_text(encoding="utf-8") == generated, f"write to {shipped}:\n{generated}"
 
 
 def test_numbers_may_be_written_with_or_without_a_fraction() -> None:

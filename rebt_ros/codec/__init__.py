@@ -1,0 +1,1 @@
+"""JSON declared once: what a form describes, it reads, writes and explains to other programs."""
