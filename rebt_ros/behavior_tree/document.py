@@ -41,8 +41,7 @@ from rebt_ros.logic.conditions import (
     Threshold,
 )
 from rebt_ros.robot_file.errors import RobotFileError
-from rebt_ros.robot_file.reading import robot_file_of
-from rebt_ros.robot_file.robot_file import RobotFile
+from rebt_ros.robot_file.reading import CarriedRobotFile
 
 FORMAT: Final = "rebt_ros/behavior_tree"
 VERSION: Final = 3
@@ -127,6 +126,8 @@ def _learned_tree(value: Json) -> LearnedTree:
         learned = _DOCUMENTS[int(version)].decode(value)
     except MisfitError as err:
         raise DocumentError(err.sentence("document")) from err
+    except RobotFileError as err:
+        raise DocumentError(str(err)) from err
     except ValueError as err:
         raise DocumentError(f"the document contradicts itself: {_beginning(str(err))}.") from err
     for tree in (learned.tree, *(suggestion.subtree for suggestion in learned.suggestions)):
@@ -163,22 +164,6 @@ class _SpanOrCategories(Form[ShownValues]):
     def schema(self, definitions: Definitions) -> Json:
         span = self._SPAN.schema(definitions) | {"minItems": 2, "maxItems": 2}
         return {"oneOf": [{"type": "null"}, span, self._CATEGORIES.schema(definitions)]}
-
-
-class _CarriedRobotFile(Form[RobotFile]):
-    """A robot file, which has a reader and a schema of its own."""
-
-    def decode(self, value: Json) -> RobotFile:
-        try:
-            return robot_file_of(value, "the document's robot file")
-        except RobotFileError as err:
-            raise DocumentError(str(err)) from err
-
-    def encode(self, value: RobotFile | None) -> Json:
-        return None if value is None else value.content
-
-    def schema(self, definitions: Definitions) -> Json:
-        return {"type": "object"}
 
 
 def _comparison(kind: type[Any], *ends: Field[Any]) -> Record[Any]:
@@ -403,7 +388,7 @@ _DOCUMENTS: Final[Mapping[int, Record[LearnedTree]]] = {
         ROBOT_VERSION,
         Field(
             "robot",
-            _CarriedRobotFile(),
+            CarriedRobotFile("the document's robot file"),
             description="The robot file that the tree was learned by, as its own schema "
             "describes it; in version 4 alone.",
         ),

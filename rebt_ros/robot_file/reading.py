@@ -9,6 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Final
 
+from rebt_ros.codec.form import Definitions, Form
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.parsing import parse
@@ -96,6 +97,32 @@ def robot_file_of(content: Json, name: str) -> RobotFile:
         RobotFileError: It is none.
     """
     return _robot_file(Place(content, name, {}), name, content)
+
+
+class CarriedRobotFile(Form[RobotFile]):
+    """The content of a robot file inside other JSON: of a recording or a tree made by it.
+
+    Args:
+        name: What to call it in messages.
+
+    Raises:
+        RobotFileError: By `decode`, where it is none.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def decode(self, value: Json) -> RobotFile:
+        """The robot file of its content."""
+        return robot_file_of(value, self._name)
+
+    def encode(self, value: RobotFile) -> Json:
+        """Its content."""
+        return value.content
+
+    def schema(self, definitions: Definitions) -> Json:
+        """That of any object."""
+        return {"type": "object"}
 
 
 def _robot_file(place: Place, name: str, content: Json) -> RobotFile:

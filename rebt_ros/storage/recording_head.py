@@ -6,17 +6,23 @@ It is the mark `# rebt_ros recording`, and JSON.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Annotated, BinaryIO, Final
 
+from rebt_ros.codec.bounds import Bounds
+from rebt_ros.codec.containers import Array
+from rebt_ros.codec.form import MisfitError
+from rebt_ros.codec.hints import record
+from rebt_ros.codec.record import Field, Record
+from rebt_ros.codec.text import parsed
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError
 from rebt_ros.robot_file.errors import RobotFileError
-from rebt_ros.robot_file.reading import robot_file_of
+from rebt_ros.robot_file.reading import CarriedRobotFile
 from rebt_ros.robot_file.robot_file import RobotFile
 
 VERSION: Final = 2
@@ -32,10 +38,7 @@ LONGEST_LINE: Final = 1 << 24
 #: The rows begin at a multiple of this many bytes.
 _ALIGNMENT: Final = 64
 
-#: Kind of a feature whose values are numbers of texts.
-_TEXT_KIND: Final = "text"
-
-#: Sample rates beyond are none (rows per second).
+#: Sample rates beyond, or below its reciprocal, are none (rows per second).
 _LARGEST_RATE: Final = 1e9
 
 
@@ -81,34 +84,89 @@ class Head:
             ValueError: It is malformed; the message says how.
         """
         try:
-            values = json.loads(text)
+            line = _decoded(text)
         except RecursionError as err:
             raise ValueError("its JSON is nested too deeply") from err
-        if not isinstance(values, dict):
-            raise ValueError("its JSON is not an object")
-        version, features, channels = (
-            values.get(one) for one in ("version", "features", "channels")
-        )
-        if type(version) is not int or version not in (VERSION, ROBOT_VERSION):
-            raise ValueError(f"its version is {version!r}, not {VERSION} or {ROBOT_VERSION}")
-        if not isinstance(features, list) or not isinstance(channels, list):
-            raise ValueError("it lists no features or no channels")
-        if not all(isinstance(channel, str) for channel in channels):
-            raise ValueError("a channel is not text")
-        if len(set(channels)) < len(channels):
+        except MisfitError as err:
+            raise ValueError(err.sentence("its head").rstrip(".")) from err
+        except RobotFileError as err:
+            raise ValueError(str(err).rstrip(".")) from err
+        if len(set(line.channels)) < len(line.channels):
             raise ValueError("two channels have the same name")
-        read = tuple(map(_parse_feature, features))
-        if len({feature.name for feature in read}) < len(read):
+        if len({column.name for column in line.features}) < len(line.features):
             raise ValueError("two features have the same name")
-        sample_rate = _parse_sample_rate(values.get("sample_rate"))
-        origin = _parse_origin(values.get("origin", Origin.DEMONSTRATION.value))
-        head = cls(read, tuple(channels), sample_rate, origin)
-        if version < ROBOT_VERSION:
+        head = cls(
+            tuple(map(_feature, line.features)), line.channels, line.sample_rate, line.origin
+        )
+        if line.version < ROBOT_VERSION:
             return head
         texts = frozenset(
-            place for place, one in enumerate(features) if one.get("kind") == _TEXT_KIND
+            place for place, column in enumerate(line.features) if column.kind is _ColumnKind.TEXT
         )
-        return replace(head, texts=texts, robot=_parse_robot(values.get("robot")))
+        return replace(head, texts=texts, robot=line.robot)
+
+
+class _ColumnKind(Enum):
+    """What the values of a column are; the first three are a `FeatureKind`."""
+
+    NUMERIC = "numeric"
+    BINARY = "binary"
+    CATEGORICAL = "categorical"
+    TEXT = "text"
+    """Numbers of texts."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    """A feature, as the first line has it."""
+
+    name: str
+    topic: str | None = None
+    index: int | None = None
+    kind: _ColumnKind = _ColumnKind.NUMERIC
+    categories: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _FirstLine:
+    """A head, as the first line has it."""
+
+    version: int
+    sample_rate: Annotated[float, Bounds(1 / _LARGEST_RATE, _LARGEST_RATE)] | None = None
+    origin: Origin = Origin.DEMONSTRATION
+    features: tuple[_Column, ...]
+    channels: tuple[str, ...]
+    robot: RobotFile | None = None
+
+
+_COLUMN: Final = record(
+    _Column,
+    "name",
+    "topic",
+    "index",
+    Field("kind", omitted=True),
+    Field("categories", omitted=True),
+    tolerant=True,
+)
+
+
+def _first_line(*further: Field[_FirstLine]) -> Record[_FirstLine]:
+    return record(
+        _FirstLine,
+        "version",
+        "sample_rate",
+        "origin",
+        Field("features", Array(_COLUMN)),
+        "channels",
+        *further,
+        tolerant=True,
+    )
+
+
+_FIRST_LINES: Final[Mapping[int, Record[_FirstLine]]] = {
+    VERSION: _first_line(),
+    ROBOT_VERSION: _first_line(Field("robot", CarriedRobotFile("its robot file"))),
+}
 
 
 def head_line(
@@ -121,26 +179,25 @@ def head_line(
     robot: RobotFile | None = None,
 ) -> bytes:
     """The first line of a recording; see `Head`."""
-    description: dict[str, Any] = {
-        "version": VERSION if robot is None else ROBOT_VERSION,
-        "sample_rate": sample_rate,
-        "origin": origin.value,
-        "features": [
-            {"name": feature.name, "topic": feature.topic, "index": feature.index}
-            for feature in features
-        ],
-        "channels": list(channels),
-    }
+    columns = [_Column(feature.name, feature.topic, feature.index) for feature in features]
     if robot is not None:
-        description["robot"] = robot.content
-        for place, (feature, its) in enumerate(zip(features, description["features"], strict=True)):
-            if place in texts:
-                its["kind"] = _TEXT_KIND
-            elif feature.kind is not FeatureKind.NUMERIC:
-                its["kind"] = feature.kind.value
-            if feature.categories:
-                its["categories"] = list(feature.categories)
-    line = MARK + json.dumps(description).encode()
+        columns = [
+            replace(
+                column,
+                kind=_ColumnKind.TEXT if place in texts else _ColumnKind(feature.kind.value),
+                categories=feature.categories,
+            )
+            for place, (column, feature) in enumerate(zip(columns, features, strict=True))
+        ]
+    first_line = _FirstLine(
+        version=VERSION if robot is None else ROBOT_VERSION,
+        sample_rate=sample_rate,
+        origin=origin,
+        features=tuple(columns),
+        channels=tuple(channels),
+        robot=robot,
+    )
+    line = MARK + json.dumps(_FIRST_LINES[first_line.version].encode(first_line)).encode()
     return line + b" " * (-(len(line) + 1) % _ALIGNMENT) + b"\n"
 
 
@@ -162,54 +219,18 @@ def read_head(path: Path, file: BinaryIO) -> Head:
         ) from err
 
 
-def _parse_sample_rate(value: object) -> float | None:
-    if value is None:
-        return None
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float)
-        # Python's JSON also knows NaN and Infinity.
-        or not 0 < value <= _LARGEST_RATE
-    ):
-        raise ValueError(f"its sample rate is {value!r}, not null or a positive number")
-    return float(value)
+def _decoded(text: str) -> _FirstLine:
+    value = parsed(text)
+    version = value.get("version") if isinstance(value, dict) else None
+    if type(version) is not int or version not in _FIRST_LINES:
+        raise ValueError(f"its version is {version!r}, not {VERSION} or {ROBOT_VERSION}")
+    return _FIRST_LINES[version].decode(value)
 
 
-def _parse_origin(value: object) -> Origin:
-    for one in Origin:
-        if value == one.value:
-            return one
-    raise ValueError(f"its origin is {value!r}, not {', '.join(one.value for one in Origin)}")
-
-
-def _parse_feature(value: object) -> Feature:
-    if not isinstance(value, dict):
-        raise ValueError(f"{value!r} is not a feature")
-    name, topic, index = value.get("name"), value.get("topic"), value.get("index")
-    if not (
-        isinstance(name, str)
-        and isinstance(topic, str | None)
-        and isinstance(index, int | None)
-        and not isinstance(index, bool)
-    ):
-        raise ValueError(f"{value!r} is not a feature")
-    kind, categories = value.get("kind", "numeric"), value.get("categories", [])
-    if kind == _TEXT_KIND:
-        return Feature(name, topic=topic, index=index)
-    kinds = {one.value: one for one in FeatureKind}
-    if not (
-        isinstance(kind, str)
-        and kind in kinds
-        and isinstance(categories, list)
-        and all(isinstance(category, str) for category in categories)
-        and len(set(categories)) == len(categories)
-    ):
-        raise ValueError(f"{value!r} is not a feature")
-    return Feature(name, kinds[kind], tuple(categories), topic, index)
-
-
-def _parse_robot(value: object) -> RobotFile:
-    try:
-        return robot_file_of(value, "its robot file")
-    except RobotFileError as err:
-        raise ValueError(str(err).rstrip(".")) from err
+def _feature(column: _Column) -> Feature:
+    if len(set(column.categories)) < len(column.categories):
+        raise ValueError(f"feature {column.name!r} has two categories of the same name")
+    if column.kind is _ColumnKind.TEXT:
+        return Feature(column.name, topic=column.topic, index=column.index)
+    kind = FeatureKind(column.kind.value)
+    return Feature(column.name, kind, column.categories, column.topic, column.index)

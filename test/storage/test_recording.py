@@ -17,8 +17,9 @@ from recording_examples import FEATURES, ROWS, assert_same
 
 from rebt_ros.demonstration.builder import LARGEST_VALUE
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
-from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError
+from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.storage import recording, recording_rows
 from rebt_ros.storage.recording import (
     RecordingError,
@@ -27,7 +28,7 @@ from rebt_ros.storage.recording import (
     read_recording,
     recordings,
 )
-from rebt_ros.storage.recording_head import Head, Origin, read_head
+from rebt_ros.storage.recording_head import Head, Origin, head_line, read_head
 from rebt_ros.storage.recording_rows import LABEL, record_type
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -383,27 +384,39 @@ def test_what_no_recorder_writes_is_named_in_one_sentence(tmp_path, change, mess
         (b'"version": 2', b'"version": 4', "its version is 4, not 2 or 3: use the version"),
         (b'"version": 2', b'"version": 1', "its version is 1, not 2 or 3: use the version"),
         (b'"version": 2', b'"version": true', "its version is True"),
-        (b'"features": [', b'"features": 7, "x": [', "lists no features"),
-        (b'"name": "front"', b'"name": 7', "is not a feature"),
+        (b'"features": [', b'"features": 7, "x": [', "its head.features must be an array, not 7"),
+        (b'"name": "front"', b'"name": 7', r"its head.features\[\d\].name must be a text, not 7"),
         (b'"index": 0', b'"index": null', "needs both a topic and an index"),
-        (b'"topic": "/state", "index": 0', b'"index": true', "is not a feature"),
+        (
+            b'"topic": "/state", "index": 0',
+            b'"index": true',
+            "index must be a whole number, not True",
+        ),
         (b'["/action"]', b'["/action", "/action"]', "two channels have the same name"),
-        (b'rate": null', b'rate": true', "its sample rate is True, not null or a positive number"),
-        (b'rate": null', b'rate": "10"', "its sample rate is '10'"),
-        (b'rate": null', b'rate": [10]', "its sample rate is \\[10\\]"),
-        (b'rate": null', b'rate": 0', "its sample rate is 0,"),
-        (b'rate": null', b'rate": -1.5', "its sample rate is -1.5,"),
-        (b'rate": null', b'rate": NaN', "its sample rate is nan,"),
-        (b'rate": null', b'rate": Infinity', "its sample rate is inf,"),
-        (b'rate": null', b'rate": 1' + b"0" * 400, "its sample rate is 1000"),
+        (b'rate": null', b'rate": true', "its head.sample_rate must be a number, not True"),
+        (b'rate": null', b'rate": "10"', "its head.sample_rate must be a number, not '10'"),
+        (b'rate": null', b'rate": [10]', "must be a number, not \\[10\\]"),
+        (b'rate": null', b'rate": 0', "must be a number from 1e-09 to 1e\\+09, not 0"),
+        (b'rate": null', b'rate": -1.5', "must be a number from 1e-09 to 1e\\+09, not -1.5"),
+        (b'rate": null', b'rate": NaN', "NaN is not a number"),
+        (b'rate": null', b'rate": Infinity', "Infinity is not a number"),
+        (
+            b'rate": null',
+            b'rate": 1' + b"0" * 400,
+            "must be a number from 1e-09 to 1e\\+09, not 1000",
+        ),
         (b'rate": null', b'rate": 1' + b"0" * 5000, "cannot be read"),
         (
             b'"origin": "demonstration"',
             b'"origin": "robot"',
-            "its origin is 'robot', not demonstration, takeover, failed: use the version",
+            "origin must be one of demonstration, takeover, failed, not 'robot': use the version",
         ),
-        (b'"origin": "demonstration"', b'"origin": null', "its origin is None"),
-        (b'"origin": "demonstration"', b'"origin": ["failed"]', "its origin is \\['failed'\\]"),
+        (b'"origin": "demonstration"', b'"origin": null', "origin must be one of .*, not None"),
+        (
+            b'"origin": "demonstration"',
+            b'"origin": ["failed"]',
+            "origin must be one of .*, not \\['failed'\\]",
+        ),
         (b"recording {", b"recording ", "cannot be read"),
         (b"recording {", b"recording " + b"[" * 100_000, "nested too deeply"),
         (b"# rebt_ros recording", b"# something", "is not a recording"),
@@ -544,3 +557,32 @@ def test_without_a_word_on_the_sample_rate_a_row_is_an_event(tmp_path: Path) -> 
     path.write_bytes(path.read_bytes().replace(b'"sample_rate": null, ', b"", 1))
     assert head_of(path).sample_rate is None
     assert read_recording(path).demonstration.row_kind is RowKind.EVENT
+
+
+def test_first_lines_are_the_same_bytes_as_in_every_release() -> None:
+    features = (Feature("x", topic="/s", index=0), Feature("é", topic="/s", index=1))
+    line = head_line(features, ("/a",), 2.5, Origin.FAILED)
+    assert line.rstrip() == (
+        b'# rebt_ros recording {"version": 2, "sample_rate": 2.5, "origin": "failed", '
+        b'"features": [{"name": "x", "topic": "/s", "index": 0}, '
+        b'{"name": "\\u00e9", "topic": "/s", "index": 1}], "channels": ["/a"]}'
+    )
+    assert len(line) % 64 == 0
+
+
+def test_first_lines_by_a_robot_file_say_the_kinds_of_features() -> None:
+    robot = parse_robot_file("state: {x: /s.x, y: /s.y, z: /s.z}")
+    features = (
+        Feature("x"),
+        Feature("y", FeatureKind.CATEGORICAL, ("a", "b")),
+        Feature("z"),
+    )
+    line = head_line(features, ("/a",), None, texts=(2,), robot=robot)
+    assert line.rstrip() == (
+        b'# rebt_ros recording {"version": 3, "sample_rate": null, "origin": "demonstration", '
+        b'"features": [{"name": "x", "topic": null, "index": null}, '
+        b'{"name": "y", "topic": null, "index": null, "kind": "categorical", '
+        b'"categories": ["a", "b"]}, '
+        b'{"name": "z", "topic": null, "index": null, "kind": "text"}], "channels": ["/a"], '
+        b'"robot": {"state": {"x": "/s.x", "y": "/s.y", "z": "/s.z"}}}'
+    )

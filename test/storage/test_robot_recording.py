@@ -99,7 +99,7 @@ def _changed(path: Path, change: str) -> Path:
     ("change", "said"),
     [
         ("category", "'power' holds a value that is none of its categories"),
-        ("kind", "is not a feature"),
+        ("kind", "kind must be one of numeric, binary, categorical, text, not"),
         ("robot", "its robot file: state names no feature"),
         ("text", "'x' holds a text that is not there"),
     ],
