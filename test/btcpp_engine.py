@@ -14,7 +14,7 @@ from py_trees.common import Status
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
-from rebt_ros.export.blackboard import variables
+from rebt_ros.export.blackboard import MISSING_TEXT, Variable, variables
 from rebt_ros.export.btcpp import _Export
 
 #: How an action ends in one tick, by label.
@@ -76,9 +76,7 @@ class Engine:
             if variable is None:
                 continue
             if feature.categories:
-                category = "" if math.isnan(value) else feature.categories[int(value)]
-                # Categories that are not tested may hold any other text.
-                board.set_string(variable.name, variable.categories.get(category, "none of them"))
+                board.set_string(variable.name, _text(variable, value))
             else:
                 board.set_double(variable.name, value)
         return self.log, self._tree.tick_exactly_once().name
@@ -94,3 +92,12 @@ class Engine:
 
     def _halt(self, action: nodes.Action, node: Any) -> None:
         self.log.halted[action] += 1
+
+
+def _text(variable: Variable, value: float) -> str:
+    """What a program writes to the variable of a feature that has categories."""
+    if math.isnan(value):
+        return MISSING_TEXT
+    category = variable.feature.categories[int(value)]
+    # Categories that are not tested may hold any other text.
+    return variable.categories.get(category, "none of them")

@@ -7,14 +7,18 @@ import signal
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import prompt_answers
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 
 if TYPE_CHECKING:
     from ros_processes import Peer
 
 # No test hears, or is heard by, another machine.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+# Whichever test uses the middleware first.
+prompt_answers.use()
 
 # A script's background jobs ignore SIGINT, and so would every process that a test starts.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -26,6 +30,8 @@ settings.register_profile(
     "rebt_ros",
     deadline=None,
     derandomize=True,
+    # Why a failure fails can take minutes to find out.
+    phases=set(Phase) - {Phase.explain},
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile("search", settings.get_profile("rebt_ros"), derandomize=False)

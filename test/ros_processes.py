@@ -18,6 +18,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import prompt_answers
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import GetParameters
@@ -40,9 +41,6 @@ AGES = 600.0
 
 #: How long a node may take to end by itself where a test has left it running (seconds).
 _LAST_WORDS = 5.0
-
-#: Makes it quick to wait for deliveries; for the test's own process, not for the nodes.
-_PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", str(Path(__file__).with_name("prompt_answers.xml")))
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -122,7 +120,7 @@ class NodeProcess:
             ROS_LOG_DIR=str(directory / "log"),
             PYTHONPATH=os.pathsep.join([str(CHECKOUT), os.environ.get("PYTHONPATH", "")]),
         )
-        environment.pop(_PROFILES[0], None)
+        environment.pop(prompt_answers.VARIABLE, None)
         self._errors = directory / f"{module}.{time.monotonic_ns()}.stderr"
         with self._errors.open("wb") as errors:
             self.process = subprocess.Popen(
@@ -219,7 +217,7 @@ class Peer:
 
     def __init__(self, domain: int) -> None:
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        os.environ.setdefault(*_PROFILES)
+        prompt_answers.use()
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain)
         self.node = Node("test_peer", context=self._context)

@@ -141,7 +141,7 @@ def test_both_engines_tick_the_same_actions(
     assert list(_differences(learned, seed, interrupted_after)) == []
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(some.learned_trees(), st.integers(0, 10**6))
 def test_both_engines_agree_whatever_things_are_called(learned: LearnedTree, seed: int) -> None:
     learned = replace(learned, tree=_exportable(learned.tree), suggestions=())
