@@ -1,0 +1,88 @@
+// The chart of tree sizes, drawn by plotly, which the studio serves from its own machine.
+
+import { element } from "./dom.js";
+import { count, percent } from "./words.js";
+
+let loading = null;
+
+function plotly() {
+  loading ??= new Promise((resolve, reject) => {
+    const failed = () => {
+      loading = null;
+      reject(new Error("the chart could not be loaded"));
+    };
+    document.head.append(
+      element("script", { src: "/plotly.js", load: () => (window.Plotly ? resolve(window.Plotly) : failed()), error: failed }),
+    );
+  });
+  return loading;
+}
+
+/**
+ * Draws size against agreement and recall.
+ *
+ * @param {HTMLElement} host - Where.
+ * @param {object[]} levels - As the studio sends them.
+ * @param {number} current - The level in the draft.
+ * @param {(number: number) => void} choose - Told which level was pressed.
+ */
+export async function drawLevels(host, levels, current, choose) {
+  const Plotly = await plotly();
+  const style = getComputedStyle(host);
+  const color = (name) => style.getPropertyValue(name).trim();
+  const [ink, faded, rule] = [color("--ink"), color("--faded"), color("--rule")];
+  const sorted = [...levels].sort((left, right) => left.leaves - right.leaves);
+  const x = sorted.map((level) => level.leaves);
+  const line = (name, key, shade, symbol, dash) => ({
+    name,
+    x,
+    y: sorted.map((level) => level[key]),
+    customdata: sorted.map((level) => level.number),
+    text: sorted.map((level) => `${count(level.leaves, "leaf", "leaves")}: ${name} ${percent(level[key])}`),
+    hoverinfo: "text",
+    mode: "lines+markers",
+    line: { color: shade, width: 2.5, dash },
+    marker: { symbol, size: 11, color: shade },
+  });
+  const marked = (name, level, symbol, shade, size) => ({
+    name,
+    x: [level.leaves],
+    y: [level.agreement],
+    customdata: [level.number],
+    text: [`${name}: ${count(level.leaves, "leaf", "leaves")}`],
+    hoverinfo: "text",
+    mode: "markers",
+    marker: { symbol, size, color: shade, line: { color: shade, width: 3 } },
+  });
+  const traces = [
+    line("agreement", "agreement", color("--blue"), "circle", "solid"),
+    line("recall, mean of all actions", "recall", color("--orange"), "square", "dot"),
+  ];
+  const chosen = sorted.find((level) => level.number === current);
+  if (chosen && chosen.agreement !== null) traces.push(marked("in your draft", chosen, "circle-open", ink, 24));
+  const layout = {
+    margin: { l: 54, r: 16, t: 64, b: 48 },
+    paper_bgcolor: "rgba(0,0,0,0)",
+    plot_bgcolor: "rgba(0,0,0,0)",
+    font: { color: ink, size: 14, family: "system-ui, sans-serif" },
+    hovermode: "closest",
+    dragmode: false,
+    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { color: ink } },
+    height: 360,
+    xaxis: {
+      title: { text: "size: leaves of the decision tree", font: { size: 14 } },
+      type: x.at(-1) > 50 * Math.max(x[0], 1) ? "log" : "linear",
+      gridcolor: rule,
+      zeroline: false,
+      tickcolor: faded,
+      fixedrange: true,
+    },
+    yaxis: { tickformat: ".0%", gridcolor: rule, zeroline: false, rangemode: "normal", fixedrange: true },
+  };
+  await Plotly.react(host, traces, layout, { displayModeBar: false, responsive: true });
+  host.removeAllListeners?.("plotly_click");
+  host.on("plotly_click", (event) => {
+    const [point] = event.points;
+    if (point?.customdata !== undefined) choose(point.customdata);
+  });
+}

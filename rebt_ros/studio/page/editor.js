@@ -1,0 +1,125 @@
+// What can be done to the node that was pressed: its threshold, its kind, its place, its end.
+
+import { button, byId, element, setText } from "./dom.js";
+import { Histogram } from "./histogram.js";
+import { isNumeric } from "./margins.js";
+import { calm } from "./tree.js";
+import { sentence } from "./words.js";
+
+/** The panel beside the draft. */
+export class Editor {
+  constructor({ state, ask }) {
+    this.state = state;
+    this.ask = ask;
+    this.node = null;
+    this.view = null;
+    this.shown = null;
+  }
+
+  /** Shows a node of the draft; null: none. What was just chosen is brought into sight. */
+  show(node, view, chosen = false) {
+    this.node = node;
+    this.view = view;
+    const body = byId("editor-body");
+    if (!node) {
+      this.shown = null;
+      setText(byId("editor-title"), "Change a node");
+      body.replaceChildren(
+        element("p", { class: "hint" }, "Press a node of your draft: here you can move its threshold, choose how it runs, move it or delete it. Nothing reaches the robot before you publish."),
+      );
+      return;
+    }
+    const words = node.label === undefined ? node.text : this.state.shown(node.label);
+    setText(byId("editor-title"), words);
+    const parts = [element("p", {}, sentence(node.explanation))];
+    const place = element("div", { class: "place" });
+    if (isNumeric(node)) parts.push(place);
+    if (this.choosable(node)) parts.push(this.psa(node));
+    parts.push(this.moves(node));
+    body.replaceChildren(...parts);
+    if (chosen) byId("editor").scrollIntoView({ block: "nearest", behavior: calm() ? "auto" : "smooth" });
+    if (isNumeric(node)) this.histogram(node, place);
+  }
+
+  /** Whether its actions may run at the same time or one after the other. */
+  choosable(node) {
+    if (node.kind === "psa") return true;
+    const children = this.view.nodes.filter((other) => other.parent === node.path);
+    return (
+      node.kind === "control" && children.length > 1 && children.every((other) => other.label !== undefined) &&
+      /Parallel|Selector/.test(node.text)
+    );
+  }
+
+  psa(node) {
+    const is = (word) => node.kind !== "psa" && node.text.includes(word);
+    const choose = (choice) => this.ask("psa", { path: node.path, choice }, { undo: () => this.ask("undo") });
+    return element(
+      "div",
+      { class: "choice" },
+      element("h3", {}, "How do these actions run?"),
+      button("All at the same time (Parallel)", () => choose("parallel"), { "aria-pressed": String(is("Parallel")) }),
+      button("The first one that can (Selector)", () => choose("selector"), { "aria-pressed": String(is("Selector")) }),
+    );
+  }
+
+  moves(node) {
+    const siblings = this.view.nodes.filter((other) => other.parent === node.parent);
+    const place = siblings.indexOf(siblings.find((other) => other.path === node.path));
+    const undo = () => this.ask("undo");
+    const move = (by) => this.ask("move", { path: node.path, by }, { undo });
+    const isRoot = node.parent === null;
+    const within = this.view.nodes.filter((other) => other.path.startsWith(`${node.path}.`)).length;
+    const earlier = button("◀ Earlier", () => move(-1), { title: "Is tried before its neighbour on the left" });
+    const later = button("Later ▶", () => move(1), { title: "Is tried after its neighbour on the right" });
+    const remove = button(within ? `Delete this branch of ${within + 1} nodes` : "Delete this node", () => this.ask("remove", { path: node.path }, { undo }), { class: "careful" });
+    earlier.disabled = isRoot || place === 0;
+    later.disabled = isRoot || place === siblings.length - 1;
+    remove.disabled = isRoot;
+    return element("div", { class: "buttons" }, earlier, later, remove);
+  }
+
+  async histogram(node, place) {
+    const feature = node.feature ?? null;
+    if (feature === null) {
+      place.replaceChildren(this.typed(node));
+      return;
+    }
+    place.replaceChildren(element("p", { class: "hint" }, "Counting…"));
+    const answer = await this.ask("histogram", { feature }, { quiet: true });
+    if (this.node !== node) return;
+    if (!answer.ok) {
+      place.replaceChildren(element("p", { class: "hint" }, sentence(answer.message)), this.typed(node));
+      return;
+    }
+    const change = (value, end) => this.change(node, value, end);
+    place.replaceChildren(
+      element("p", { class: "hint" }, `How often each action was shown at which ${this.state.shown(feature)}. Drag the line.`),
+      new Histogram(answer.data, node, change, (name) => this.state.shown(name)).element,
+    );
+  }
+
+  /** Thresholds without a histogram: of the difference of two values, say. */
+  typed(node) {
+    const ends = ["above", "at_most"].filter((end) => node[end] !== null);
+    return element(
+      "div",
+      {},
+      ...ends.map((end) => {
+        const field = element("input", { type: "number", step: "any" });
+        field.value = String(node[end]);
+        const words = ends.length > 1 ? (end === "above" ? "Lower threshold " : "Upper threshold ") : "Threshold ";
+        return element(
+          "div",
+          { class: "tools" },
+          element("label", {}, words, field),
+          button("Change it", () => field.value !== "" && this.change(node, Number(field.value), end), { class: "primary" }),
+        );
+      }),
+    );
+  }
+
+  change(node, value, end) {
+    this.ask("threshold", { path: node.path, value, end }, { undo: () => this.ask("undo") });
+  }
+}

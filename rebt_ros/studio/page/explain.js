@@ -1,0 +1,173 @@
+// Explain: choose a moment, of a demonstration or of the last ten minutes, and see why.
+
+import { byId, element, keyed, setAttribute, setText, show } from "./dom.js";
+import { Strip } from "./strip.js";
+import { thumbnail } from "./thumbnail.js";
+import { Tree, actingPaths, treeTools } from "./tree.js";
+import { showNoWhy, showWhy } from "./why.js";
+import { clock, count, duration } from "./words.js";
+
+const ROBOT = "";
+
+/** The section. */
+export class Explain {
+  sections = ["demonstrations", "tree", "draft", "timeline", "names"];
+
+  constructor({ state, ask, visit }) {
+    this.state = state;
+    this.ask = ask;
+    this.go = visit;
+    this.name = ROBOT;
+    this.seconds = 0;
+    this.number = 0;
+    const shown = (name) => state.shown(name);
+    this.tree = new Tree(byId("explain-tree"), {
+      label: "The tree at that moment",
+      shown,
+      live: true,
+      choose: (node) => this.explain(node.path),
+    });
+    byId("explain-tools").append(treeTools(this.tree, { jump: () => this.acting && this.tree.reveal(this.acting) }));
+    this.strip = new Strip(byId("explain-strip"), state, (time) => this.ofRobot(time));
+    byId("explain-which").addEventListener("change", (event) => this.visit(event.target.value));
+    byId("explain-seconds").addEventListener("input", (event) => this.at(Number(event.target.value)));
+    byId("explain-picture").addEventListener("pointerdown", (event) => this.press(event));
+    byId("explain-picture").addEventListener("pointermove", (event) => event.buttons && this.press(event));
+  }
+
+  render(changed) {
+    if (changed.has("demonstrations") || changed.has("names")) this.choices();
+    if (changed.has("timeline")) this.strip.render();
+    const { view } = this.isRobot ? this.state.get("tree") : this.state.get("draft");
+    if (view) this.tree.show(view, this.state.get("names"));
+    if (this.told) this.color();
+  }
+
+  get isRobot() {
+    return this.name === ROBOT;
+  }
+
+  choices() {
+    const all = Object.entries(this.state.get("demonstrations")).filter(([, one]) => !one.deleted && one.rows);
+    all.sort((left, right) => right[1].start - left[1].start);
+    const choices = [[ROBOT, null], ...all];
+    keyed(
+      byId("explain-which"),
+      choices.map(([name, one]) => [name || "robot", [name, one]]),
+      () => element("option"),
+      (child, [name, one]) => {
+        child.value = name;
+        setText(child, one ? `${one.start ? clock(one.start) : name}: ${duration(one.seconds)}, ${count(one.rows, "row")}` : "the robot, in the last ten minutes");
+      },
+    );
+    if (!choices.some(([name]) => name === this.name)) this.name = ROBOT;
+    this.picture();
+  }
+
+  /** Chooses a demonstration by name; the empty name is the robot. */
+  visit(name) {
+    this.name = name;
+    this.seconds = 0;
+    this.told = null;
+    this.picture();
+    this.render(new Set());
+    if (!this.isRobot && this.state.get("demonstrations")[name]) this.at(0);
+    else showNoWhy(byId("explain-why"), "Choose a moment: press a point of the picture above.");
+  }
+
+  picture() {
+    byId("explain-which").value = this.name;
+    const shown = this.state.get("demonstrations")[this.name];
+    show(byId("explain-strip"), this.isRobot);
+    show(byId("explain-slide"), !this.isRobot);
+    show(byId("explain-picture"), !this.isRobot);
+    setText(
+      byId("explain-hint"),
+      this.isRobot
+        ? "Press a point of the strip: you see what the robot's tree did then, and why."
+        : "Press a point of the picture: you see what your draft does then, and why.",
+    );
+    if (this.isRobot || !shown) return;
+    const drawn = thumbnail(shown, (one) => this.state.shown(one), { large: true });
+    this.cursor = element("span", { class: "cursor" });
+    byId("explain-picture").replaceChildren(element("div", { class: "cut" }, drawn.firstElementChild, this.cursor), drawn);
+    setAttribute(byId("explain-seconds"), "max", shown.seconds);
+    this.point();
+  }
+
+  point() {
+    const shown = this.state.get("demonstrations")[this.name];
+    if (!shown || !this.cursor) return;
+    this.cursor.style.left = `${(this.seconds / Math.max(shown.seconds, 1e-6)) * 100}%`;
+    byId("explain-seconds").value = this.seconds;
+    setText(byId("explain-output"), duration(this.seconds));
+  }
+
+  press(event) {
+    const frame = byId("explain-picture").querySelector(".cut");
+    const shown = this.state.get("demonstrations")[this.name];
+    if (!frame || !shown || !frame.contains(event.target)) return;
+    const box = frame.getBoundingClientRect();
+    this.at(Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1) * shown.seconds);
+  }
+
+  at(seconds) {
+    this.seconds = seconds;
+    this.point();
+    this.explain(null);
+  }
+
+  ofRobot(time) {
+    this.time = time;
+    this.explain(null);
+  }
+
+  /** Asks why; while an answer is under way only the newest question waits. */
+  async explain(path) {
+    const given = this.isRobot
+      ? this.time === null || this.time === undefined ? {} : { t: this.time }
+      : { demonstration: this.name, seconds: this.seconds };
+    if (path !== null) given.path = path;
+    this.wanted = given;
+    if (this.busy) return;
+    this.busy = true;
+    let answer;
+    let asked;
+    do {
+      asked = this.wanted;
+      answer = await this.ask("explain", asked, { quiet: true });
+    } while (asked !== this.wanted);
+    this.busy = false;
+    if (!answer.ok) {
+      this.told = null;
+      this.tree.status(null, {}, null);
+      showNoWhy(byId("explain-why"), answer.message);
+      return;
+    }
+    this.told = answer.data;
+    showWhy(byId("explain-why"), answer.data, this.go);
+    this.color();
+    if (this.acting && path === null) this.tree.reveal(this.acting);
+  }
+
+  color() {
+    const { statuses, values, acting } = this.told;
+    const shown = values ?? {};
+    const numbers = Object.fromEntries(Object.entries(shown).map(([name, value]) => [name, plain(value)]));
+    this.acting = acting ?? [...(this.tree.view ? actingPaths(this.tree.view, statuses, {}) : [])][0] ?? null;
+    this.tree.status(statuses ?? null, numbers, this.acting ? new Set([this.acting]) : null);
+    keyed(
+      byId("explain-values"),
+      Object.entries(shown).sort(),
+      (name) => element("li", {}, element("span", { class: "name" }, this.state.shown(name)), element("span", { class: "value" })),
+      (child, value) => setText(child.children[1], String(value ?? "not known")),
+    );
+  }
+}
+
+/** A value that came as text, as the number that it is, if it is one. */
+function plain(value) {
+  if (typeof value !== "string") return value;
+  const number = Number(value.replace("−", "-"));
+  return value.trim() !== "" && Number.isFinite(number) ? number : value;
+}
