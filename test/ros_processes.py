@@ -42,6 +42,9 @@ AGES = 600.0
 #: How long a node may take to end by itself where a test has left it running (seconds).
 _LAST_WORDS = 5.0
 
+#: Between two looks at a condition no more than this counts as waiting (seconds).
+_STOOD_STILL = 1.0
+
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -55,16 +58,20 @@ def wait_until(
     """Waits until the condition holds and returns its value.
 
     Raises:
-        TimeoutError: It did not hold in time.
+        TimeoutError: It did not hold in time.  Time in which the test stood still, as where its
+            machine was paused, does not count.
     """
-    end = time.monotonic() + timeout
+    waited, before = 0.0, time.monotonic()
     while True:
         value = condition()
         if value:
             return value
-        if time.monotonic() > end:
+        if waited > timeout:
             raise TimeoutError(f"waited {timeout} s in vain for {what or condition}")
         meanwhile()
+        now = time.monotonic()
+        waited += min(now - before, _STOOD_STILL)
+        before = now
 
 
 @contextmanager

@@ -194,6 +194,8 @@ def test_what_was_shown_is_learned_and_commanded(domain: int, peer: Peer, tmp_pa
         NodeProcess("learner_node", domain, tmp_path, PARAMETERS) as learner,
         NodeProcess("executor_node", domain, tmp_path, {"rate": 200.0}) as executor,
     ):
+        # The executor listens to persons, and may be heard of before the recorder.
+        peer.connect(String, "action", subscribers=2)
         chance = random.Random(1)
         _demonstrate(peer, chance, demonstrations=4, rows=100)
 
