@@ -79,7 +79,10 @@ export async function drawLevels(host, levels, current, choose) {
     },
     yaxis: { tickformat: ".0%", gridcolor: rule, zeroline: false, rangemode: "normal", fixedrange: true },
   };
-  await Plotly.react(host, traces, layout, { displayModeBar: false, responsive: true });
+  // Plotly adds to what is there, also to words that say to wait.
+  const isNew = !host.classList.contains("js-plotly-plot");
+  if (isNew) host.replaceChildren();
+  await Plotly[isNew ? "newPlot" : "react"](host, traces, layout, { displayModeBar: false, responsive: true });
   host.removeAllListeners?.("plotly_click");
   host.on("plotly_click", (event) => {
     const [point] = event.points;

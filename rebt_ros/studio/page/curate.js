@@ -36,7 +36,7 @@ export class Curate {
 
   key(event) {
     if (!(event.ctrlKey || event.metaKey) || event.altKey || byId("panel-curate").hidden) return;
-    if (event.target.matches("input, textarea")) return;
+    if (event.target.matches?.("input, textarea")) return;
     const letter = event.key.toLowerCase();
     const verb = letter === "y" || (letter === "z" && event.shiftKey) ? "redo" : letter === "z" ? "undo" : null;
     if (!verb) return;

@@ -92,6 +92,7 @@ export class Learn {
     const { levels, level } = this.state.get("learning");
     const host = byId("learn-chart");
     if (!levels?.some((one) => one.agreement !== null)) {
+      host.classList.remove("js-plotly-plot");
       host.replaceChildren(
         element("p", { class: "hint" }, "With several demonstrations there is a chart here: how often each size does what was shown."),
       );

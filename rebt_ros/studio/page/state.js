@@ -52,6 +52,8 @@ export class State {
         else section[key] = value;
       }
     }
+    // Trees are drawn again where names are others, which they see by the object.
+    if (sections.names) this.sections.names = { ...this.sections.names };
     this.touch(Object.keys(sections));
   }
 

@@ -17,6 +17,7 @@ export class Takeover {
     this.timer = null;
     this.active = false;
     this.labels = [];
+    this.added = new Set();
     this.gamepads = new Gamepads({
       press: (label) => this.active && this.hold(label, "gamepad"),
       release: () => this.letGo("gamepad"),
@@ -30,6 +31,13 @@ export class Takeover {
       this.letGo();
       ask("enable", { on: true });
     });
+    byId("new-action").addEventListener("submit", (event) => {
+      event.preventDefault();
+      const field = byId("new-action-name");
+      if (field.value.trim()) this.added.add(field.value.trim());
+      field.value = "";
+      this.render();
+    });
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("keyup", (event) => {
       if (event.key === this.heldKey) this.letGo("key");
@@ -40,17 +48,17 @@ export class Takeover {
 
   render() {
     const actions = this.state.get("actions");
-    this.labels = Object.keys(actions).sort();
+    this.labels = [...new Set([...Object.keys(actions), ...this.added])].sort();
     this.gamepads.know(this.labels);
     setText(
       byId("takeover-hint"),
       this.labels.length
         ? "Hold a button down: the robot does it until you let go, and the tree waits meanwhile. The keys 1 to 9 work, too."
-        : "No actions are known yet. They appear as soon as a tree is published or a demonstration was recorded.",
+        : "No actions are known yet: write the name of one below, as the robot knows it, and hold its button down to drive.",
     );
     keyed(
       byId("takeover"),
-      this.labels.map((label) => [label, actions[label]]),
+      this.labels.map((label) => [label, null]),
       (label) => this.button(label),
       (child, _, label) => {
         const [name, hint] = child.children;
@@ -105,7 +113,7 @@ export class Takeover {
 
   key(event) {
     if (!this.active || event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
-    if (event.target.matches("input:not([type=range]), select, textarea")) return;
+    if (event.target.matches?.("input:not([type=range]), select, textarea")) return;
     const label = this.labels[DIGITS.indexOf(event.key)];
     if (label !== undefined && DIGITS.includes(event.key)) this.holdKey(event.key, label);
   }
