@@ -9,7 +9,7 @@ from setuptools import find_packages, setup
 from setuptools.command.install_scripts import install_scripts
 
 PACKAGE = "rebt_ros"
-NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
+NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "studio", "synthetic_robot")
 
 #: Begins an executable: it finds the package beside it, also where nothing was sourced.
 OWN_MODULES = """\
@@ -76,6 +76,7 @@ setup(
         PACKAGE: ["py.typed"],
         f"{PACKAGE}.behavior_tree": ["*.schema.json"],
         f"{PACKAGE}.robot_file": ["*.schema.json"],
+        f"{PACKAGE}.studio": ["page/*"],
         f"{PACKAGE}.verification": ["*.schema.json"],
     },
     data_files=[
@@ -105,7 +106,8 @@ setup(
         # BehaviorTree.CPP in Python, to test exported trees: wheels for one kind of processor.
         "engines": ["behaviortreepy>=0.1.4"] if machine() == "x86_64" else [],
         "pictures": ["matplotlib>=3.6"],
-        "test": ["hypothesis", "jsonschema>=4.10", "pytest", "pytest-xdist>=3"],
+        "studio": ["aiohttp>=3.9", "plotly>=5"],
+        "test": ["hypothesis", "jsonschema>=4.10", "pytest", "pytest-xdist>=3", "selenium>=4"],
         "upsampling": ["imbalanced-learn>=0.12"],
     },
     cmdclass={"install_scripts": InstallScripts},

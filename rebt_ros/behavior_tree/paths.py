@@ -73,6 +73,38 @@ def removed(tree: nodes.Node, path: Path) -> nodes.Node:
     raise ValueError("the whole tree cannot be removed")
 
 
+def moved(tree: nodes.Node, path: Path, by: int) -> nodes.Node:
+    """The tree with a node so many places further behind its siblings, or further before them.
+
+    Raises:
+        LookupError: There is no node at the path, or no such place.
+    """
+    node_at(tree, path)
+    if not path:
+        raise LookupError("the root has no siblings")
+    parent = node_at(tree, path[:-1])
+    siblings, place = list(nodes.children(parent)), path[-1] + by
+    if not 0 <= place < len(siblings):
+        raise LookupError(f"{text_of(path)} has {len(siblings) - 1} siblings")
+    siblings.insert(place, siblings.pop(path[-1]))
+    return replaced(tree, path[:-1], _with_children(parent, tuple(siblings)))
+
+
+def path_of(text: str) -> Path:
+    """What `text_of` has written.
+
+    >>> path_of("root"), path_of("2.0")
+    ((), (2, 0))
+
+    Raises:
+        LookupError: It is no path.
+    """
+    steps = [] if text == "root" else text.split(".")
+    if not all(step.isascii() and step.isdecimal() and len(step) < 10 for step in steps):
+        raise LookupError(f"{text!r} is no path")
+    return tuple(map(int, steps))
+
+
 def text_of(path: Path) -> str:
     """A path as it is shown: ``root``, or positions with points between them.
 

@@ -12,9 +12,9 @@ from rebt_ros.drawing.shapes import PAGE_WIDTH, Drawing, Page, framed, page, she
 def behavior_tree_page(learned: LearnedTree) -> Page:
     """The main tree and each suggestion that is not attached, with a title and a legend."""
     wording = Wording(learned)
-    main = drawn(_figures(learned.tree, wording))
+    main = drawn_tree(learned.tree, wording)
     suggestions = [
-        framed(drawn(_figures(suggestion.subtree, wording)), heading(suggestion))
+        framed(drawn_tree(suggestion.subtree, wording), heading(suggestion))
         for suggestion in offered(learned)
     ]
     shown = [learned.tree, *(suggestion.subtree for suggestion in offered(learned))]
@@ -24,6 +24,11 @@ def behavior_tree_page(learned: LearnedTree) -> Page:
     if suggestions:
         parts.append(shelves(suggestions, width))
     return page("Behavior tree", summary(learned), parts)
+
+
+def drawn_tree(tree: nodes.Node, wording: Wording) -> Drawing:
+    """A tree alone; its nodes are marks in preorder, one each."""
+    return drawn(_figures(tree, wording))
 
 
 def _figures(tree: nodes.Node, wording: Wording) -> list[Figure]:

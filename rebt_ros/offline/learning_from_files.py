@@ -162,12 +162,16 @@ def _write_trees(
     progress: Progress,
 ) -> tuple[str, ...]:
     """Writes all but the summary; returns notes, each once."""
-    notes = write_behavior_tree(directory, result.learned)
+    channels = list(channel_directories(result.learnings))
+    notes: list[str] = []
+    # The studio waits for these; pictures take longer.
+    for name, learning in channels:
+        notes += write_learning(directory / name, learning)
+    notes += write_behavior_tree(directory, result.learned)
     write_text_atomically(directory / "tree.txt", render_text(result.learned))
-    for place, (name, learning) in enumerate(channel_directories(result.learnings)):
+    for place, (name, learning) in enumerate(channels):
         beside = directory / name
         notes += write_decision_tree(beside, learning.decision_tree.tree)
-        notes += write_learning(beside, learning)
         if most_levels:
             count = len(result.learnings)
             of_channel = _part(progress, place / count, (place + 1) / count)

@@ -23,6 +23,7 @@ _MODULES = {
     "learner": "learner.node",
     "recorder": "recorder.node",
     "robot": "robots.robot",
+    "studio": "studio.node",
     "synthetic_robot": "robots.synthetic_robot",
 }
 NODES = tuple(_MODULES)
@@ -51,6 +52,11 @@ def recorder() -> None:
 def robot() -> None:
     """Runs the simulated robot."""
     _run("robot")
+
+
+def studio() -> None:
+    """Runs the studio."""
+    _run("studio")
 
 
 def synthetic_robot() -> None:

@@ -527,6 +527,7 @@ class ExecutorNode(Node):
         runtime = self._program.runtime
         snapshot = json.dumps(
             {
+                "document": self._program.fingerprint,
                 "condition": self._condition().split(":")[0],
                 "status": runtime.root.status.name,
                 "tip": runtime.tip,

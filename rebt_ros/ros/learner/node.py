@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 import traceback
@@ -17,6 +18,7 @@ from std_srvs.srv import Trigger
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps, loads
+from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.errors import RebtError
 from rebt_ros.live.keeping_rules import kept
@@ -93,6 +95,8 @@ class LearnerNode(Node):
         self.create_service(Trigger, "~/relearn", self._relearn, callback_group=group)
         self.create_service(Trigger, "~/cancel", self._cancel, callback_group=group)
         self.create_service(Trigger, "~/rollback", self._rollback, callback_group=group)
+        self._answers = self.create_publisher(String, "~/proposal_answer", 10)
+        self.create_subscription(String, "~/proposal", self._on_proposal, 1, callback_group=group)
 
     def interrupt(self) -> None:
         """Ends the learning process, also while it learns, and with it a call of ~/relearn."""
@@ -244,6 +248,38 @@ class LearnerNode(Node):
         self._last = Report(Level.OK, response.message)
         self.get_logger().info(response.message)
         return response
+
+    def _on_proposal(self, message: String) -> None:
+        """Publishes a tree that a person made, if it keeps its rules, and says how that went."""
+        document = message.data
+        answer = {"document": fingerprint(document), "published": False, "version": ""}
+        try:
+            answer["version"], said = self._accept(document)
+            answer["published"] = True
+            self.get_logger().info(said)
+        except (RebtError, OSError) as err:
+            said = f"the proposed tree is not published, and the tree before it stays: {err}"
+            self.get_logger().warning(said)
+        text = json.dumps({**answer, "message": said}, ensure_ascii=False)
+        self._answers.publish(String(data=text))
+
+    def _accept(self, document: str) -> tuple[str, str]:
+        """Publishes a proposed tree; returns the number of its version, and a sentence.
+
+        Raises:
+            RebtError: It is no tree, does not keep its rules, or cannot be written.
+        """
+        with self._lock:
+            if self._call is not None:
+                raise LearningError(f"busy: {self._call}; try again when that is done.")
+            learned = self._keeping_rules(loads(document))
+            write_text_atomically(self._settings.output() / _TREE_FILE, document)
+            version = self._versions().keep(document)
+            self._figures = {}
+            self._publish(learned, document)
+        said = f"published a proposed tree of {nodes.size(learned.tree)} nodes, {version}."
+        self._last = Report(Level.OK, said)
+        return version.stem, said
 
     def _note(self, call: _Call, progress: Progress) -> None:
         entered = progress.stage != call.progress.stage

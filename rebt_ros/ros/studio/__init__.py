@@ -1,0 +1,1 @@
+"""The studio: a node, and the web server through which browsers see the robot and steer it."""

@@ -1,0 +1,190 @@
+"""Why a tree does what it does: now, some minutes ago, or at a moment of a demonstration."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+
+from rebt_ros.behavior_tree import nodes, paths
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.wording import name_text
+from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import OptionError
+from rebt_ros.studio.board import Board
+from rebt_ros.studio.timeline import Moment, Timeline
+from rebt_ros.studio.tree_view import Json
+from rebt_ros.studio.verbs import Answer, Arguments
+from rebt_ros.studio.workbench import Workbench
+from rebt_ros.verification.acting import Step, commanding
+from rebt_ros.verification.describing import value_text
+from rebt_ros.verification.explaining import Explanation, explain
+from rebt_ros.verification.explanation_text import lines
+
+
+class Explaining:
+    """Answers questions about moments.
+
+    Args:
+        workbench: Has the trees.
+        timeline: Has the last minutes.
+        board: Has the state as it is now.
+    """
+
+    def __init__(self, workbench: Workbench, timeline: Timeline, board: Board) -> None:
+        self._workbench = workbench
+        self._timeline = timeline
+        self._board = board
+
+    def moment(self, seconds: float) -> Answer:
+        """What was so at a time (seconds since the epoch).
+
+        Raises:
+            OptionError: It is too long ago, or nothing was known then.
+        """
+        moment = self._timeline.at(seconds)
+        if moment is None:
+            raise OptionError("nothing is known of that time: the last ten minutes are kept.")
+        return "then", {
+            "t": moment.time,
+            "document": moment.document,
+            "statuses": list(moment.statuses),
+            "values": dict(moment.values),
+            "commands": dict(moment.commands),
+        }
+
+    def explain(self, asked: Arguments) -> Answer:
+        """Why a tree does what it does: the draft at a moment of a demonstration, else what runs.
+
+        Raises:
+            RebtError: There is no such moment, or the tree cannot be explained.
+        """
+        demonstration = asked.optional_text("demonstration")
+        if demonstration:
+            return self._of_demonstration(demonstration, asked.number("seconds"))
+        seconds = asked.optional_number("t")
+        now = time.time() if seconds is None else seconds
+        moment = self._timeline.at(now)
+        if moment is None:
+            raise OptionError("nothing is known of that time: the last ten minutes are kept.")
+        return self._of_moment(moment)
+
+    def _of_demonstration(self, name: str, seconds: float) -> Answer:
+        learning = self._workbench.learning
+        table = learning.table
+        row = _row(table, name, seconds)
+        values = table.states[row].tolist()
+        explanation = learning.explain(row)
+        told = _told(learning.learned, values, [explanation])
+        done = table.actions[int(table.chosen[row])]
+        told["lines"] = [f"shown: {name_text(done)}", *told["lines"]]
+        return f"row {row}", told
+
+    def _of_moment(self, moment: Moment) -> Answer:
+        learned = self._workbench.published
+        if learned is None:
+            raise OptionError("no tree is published yet.")
+        values = [_coded(feature, moment.values) for feature in learned.features]
+        histories = {
+            channel: _history(self._timeline.done_before(moment.time, channel))
+            for channel in moment.commands
+        }
+        try:
+            tables = [self._workbench.learning.table]
+        except OptionError:
+            tables = []
+        tables = [table for table in tables if table.features == learned.features]
+        return "then", _told(learned, values, explain(learned, values, histories, tables))
+
+
+def _told(
+    learned: LearnedTree, values: Sequence[float], explanations: Sequence[Explanation]
+) -> dict[str, Json]:
+    told: list[str] = []
+    sources: list[dict[str, Json]] = []
+    acting: str | None = None
+    for explanation in explanations:
+        if len(explanations) > 1:
+            told.append(f"Channel {explanation.channel}:")
+        told += lines(learned, values, explanation)
+        if explanation.support is not None:
+            sources += [
+                {"demonstration": name, "rows": rows, "seconds": seconds}
+                for name, rows, seconds in explanation.support.demonstrations
+            ]
+        acting = acting or _acting(learned, explanation)
+    return {
+        "lines": told,
+        "values": {
+            feature.name: value_text(feature, value)
+            for feature, value in zip(learned.features, values, strict=True)
+        },
+        "acting": acting,
+        "statuses": _statuses(learned, explanations),
+        "from": sources,
+    }
+
+
+def _statuses(learned: LearnedTree, explanations: Sequence[Explanation]) -> list[str] | None:
+    """The status of each node in preorder; None for several channels, which tick by themselves."""
+    if len(explanations) > 1:
+        return None
+    statuses: list[str] = []
+
+    def note(node: nodes.Node, step: Step | None) -> None:
+        statuses.append("INVALID" if step is None else step.outcome.name)
+        ticked = step.children if step else ()
+        for child, below in zip_longest(nodes.children(node), ticked):
+            note(child, below)
+
+    note(learned.tree, explanations[0].trace)
+    return statuses
+
+
+def _acting(learned: LearnedTree, explanation: Explanation) -> str | None:
+    """The path of the action that is commanded; None if there is none, or several like it."""
+    step = commanding(explanation.trace, learned.tree)
+    if step is None:
+        return None
+    actions = [path for path, node in paths.walk(learned.tree) if isinstance(node, nodes.Action)]
+    return paths.text_of(actions[step.leaf]) if step.leaf < len(actions) else None
+
+
+def _row(table: DemonstrationTable, name: str, seconds: float) -> int:
+    """The last row of a demonstration up to a time since its first one."""
+    for number, known in enumerate(table.demonstrations):
+        if known == name or known.removesuffix(".rec") == name:
+            rows = np.flatnonzero(table.demonstration == number)
+            if len(rows):
+                since = (table.stamps[rows] - table.stamps[rows[0]]) / 1e9
+                place = int(np.searchsorted(since, seconds, side="right")) - 1
+                return int(rows[max(place, 0)])
+    raise OptionError(
+        f"the tree was not learned from {name!r}: learn again, with this demonstration."
+    )
+
+
+def _coded(feature: Feature, values: Mapping[str, Any]) -> float:
+    """A value as trees have it; NaN where it is missing."""
+    value = values.get(feature.name)
+    if value is None:
+        return math.nan
+    if feature.kind is not FeatureKind.CATEGORICAL:
+        return float(value)
+    name = value if isinstance(value, str) else f"{value:g}"
+    return float(feature.categories.index(name)) if name in feature.categories else math.nan
+
+
+def _history(done: Sequence[str]) -> ActionHistory:
+    history = ActionHistory()
+    for label in done:
+        history.begin(label)
+    if done:
+        history.previous = done[-1]
+    return history

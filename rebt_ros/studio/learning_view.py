@@ -1,0 +1,196 @@
+"""What was learned, as a browser shows it: levels, recall, the draft and what it changes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.document import dumps
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.wording import Wording, summary
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.errors import OptionError, RebtError
+from rebt_ros.learning import evaluation
+from rebt_ros.learning.learning import Learning
+from rebt_ros.studio.draft import Draft
+from rebt_ros.studio.tree_view import Json, suggestion_views, tree_view
+from rebt_ros.verification.contradictions import agreeing_demands
+from rebt_ros.verification.proof import Answer, check, verdicts
+from rebt_ros.verification.rules import RuleSet
+from rebt_ros.verification.verdict_text import details
+
+#: Levels on the chart.
+_MOST_LEVELS: Final = 25
+
+#: Bars of a histogram.
+_BARS: Final = 40
+
+
+def levels_view(learning: Learning) -> list[dict[str, Json]]:
+    """The pruning levels for a chart: size against what the tree does in cross-validation."""
+    levels = learning.levels
+    views = []
+    for number in levels.selected(_MOST_LEVELS):
+        level = levels.level(number)
+        judged = level.cross_validated
+        views.append(
+            {
+                "number": number,
+                "leaves": level.leaves,
+                "nodes": nodes.size(level.learned.tree),
+                "agreement": judged and judged.agreement,
+                "recall": judged and judged.recall,
+                "chosen": level.chosen,
+                "best": level.best,
+            }
+        )
+    return views
+
+
+def learning_view(learning: Learning, levels: Sequence[Json]) -> dict[str, Json]:
+    """What a person must know about a policy.
+
+    Args:
+        learning: The policy.
+        levels: Its pruning levels, as `levels_view` makes them: that takes a while.
+    """
+    report = learning.report
+    return {
+        "levels": list(levels),
+        "level": learning.levels.chosen,
+        "rows": len(learning.table),
+        "demonstrations": len(learning.table.demonstrations),
+        "channel": learning.table.channel,
+        "recalls": {action.label: action.recall for action in report.actions},
+        "never": [action.label for action in report.actions if not action.taken],
+        "baseline": report.most_frequent,
+        "notes": list(learning.notes),
+    }
+
+
+def draft_view(
+    draft: Draft, published: LearnedTree | None, rules: RuleSet | None
+) -> dict[str, Json]:
+    """The draft, and what it would change if it were published.
+
+    Args:
+        draft: The draft.
+        published: The tree that is published; None if there is none.
+        rules: What trees must keep; None: nothing.
+    """
+    learning = draft.learning
+    learned = learning.learned
+    return {
+        "view": tree_view(learned),
+        "summary": summary(learned),
+        "suggestions": suggestion_views(learned),
+        "changed": changed_rows(learning, published),
+        "words": list(differences_in_words(published, learned)),
+        "rules": rules_view(learning, rules),
+        "undo": draft.undoes,
+        "redo": draft.redoes,
+        "published": published is not None and dumps(published) == dumps(learned),
+    }
+
+
+def changed_rows(learning: Learning, published: LearnedTree | None) -> dict[str, Json] | None:
+    """In how many rows of which demonstrations the draft does something else.
+
+    None where there is no published tree, or it has other features.
+    """
+    if published is None or published.features != learning.learned.features:
+        return None
+    table = learning.table
+    mine = evaluation.teacher_forced_choices(learning.learned.tree, table)
+    other = evaluation.teacher_forced_choices(published.tree, table)
+    differ = np.flatnonzero(mine != other)
+    counts = Counter(table.demonstration[differ].tolist())
+    return {
+        "rows": len(differ),
+        "of": len(table),
+        "demonstrations": {
+            table.demonstrations[number]: count for number, count in counts.most_common()
+        },
+    }
+
+
+def differences_in_words(published: LearnedTree | None, draft: LearnedTree) -> Iterator[str]:
+    """Which branches come and go, each in a sentence."""
+    if published is None:
+        return
+    before, after = _branches(published), _branches(draft)
+    yield from (f"no longer: {branch}" for branch in before if branch not in after)
+    yield from (f"new: {branch}" for branch in after if branch not in before)
+    kept = [branch for branch in before if branch in after]
+    if kept != [branch for branch in after if branch in before]:
+        yield "branches stand in another order"
+
+
+def rules_view(learning: Learning, rules: RuleSet | None) -> list[dict[str, Json]]:
+    """Which rules the draft is proven to keep."""
+    if rules is None:
+        return []
+    learned = learning.learned
+    try:
+        demands = agreeing_demands(rules, learned)
+        proofs = check(learned, demands, [learning.table])
+    except RebtError as err:
+        return [{"rule": rules.source, "kept": None, "sentence": str(err)}]
+    kept = {Answer.PROVEN: True, Answer.BROKEN: False, Answer.UNKNOWN: None}
+    return [
+        {
+            "rule": str(verdict.demand.rule),
+            "kept": kept[verdict.answer],
+            "sentence": "; ".join(list(details(learned, proofs, verdict, 1))[:2]),
+        }
+        for verdict in verdicts(proofs, demands)
+    ]
+
+
+def histogram(learning: Learning, feature: str) -> dict[str, Json]:
+    """How often each action was shown, over the values of a numeric feature.
+
+    Raises:
+        OptionError: There is no such feature, or it has no numbers.
+    """
+    table = learning.table
+    place = next((i for i, one in enumerate(table.features) if one.name == feature), None)
+    if place is None or table.features[place].kind is not FeatureKind.NUMERIC:
+        raise OptionError(f"there is no numeric feature {feature!r}.")
+    values = table.states[:, place]
+    known = np.isfinite(values)
+    if not known.any():
+        raise OptionError(f"{feature!r} was never known.")
+    edges = np.histogram_bin_edges(values[known], bins=_BARS)
+    counts = {
+        label: np.histogram(values[known & (table.chosen == code)], edges)[0].tolist()
+        for code, label in enumerate(table.actions)
+    }
+    return {"edges": edges.tolist(), "counts": counts}
+
+
+def _branches(learned: LearnedTree) -> tuple[str, ...]:
+    wording = Wording(learned)
+    roots = nodes.children(learned.tree) or (learned.tree,)
+    return tuple(_branch_in_words(branch, wording) for branch in roots)
+
+
+def _branch_in_words(branch: nodes.Node, wording: Wording) -> str:
+    match branch:
+        case nodes.Condition() | nodes.Action():
+            return wording.node(branch)
+        case nodes.Inverter(child=child):
+            return f"not ({_branch_in_words(child, wording)})"
+        case nodes.Sequence(children=children):
+            return " → ".join(_branch_in_words(child, wording) for child in children)
+        case nodes.Selector(children=children) | nodes.ParallelSelector(children=children):
+            return f"({' or '.join(_branch_in_words(child, wording) for child in children)})"
+        case nodes.Parallel(children=children):
+            return f"({' and '.join(_branch_in_words(child, wording) for child in children)})"
+        case nodes.Repeater(children=children):
+            words = " → ".join(_branch_in_words(child, wording) for child in children)
+            return f"again and again ({words})"

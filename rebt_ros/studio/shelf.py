@@ -1,0 +1,234 @@
+"""The demonstrations in a directory: what is in them, and which of them are learned from.
+
+Nothing is destroyed before it can no longer be missed: what is left out or deleted gets another
+name, which `recordings` passes over, and the files of what was deleted go after `UNDO_TIME`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.errors import InputError, OptionError, RebtError
+from rebt_ros.storage.atomic import StorageError
+from rebt_ros.storage.recording import ASIDE, SUFFIX, is_recording, read_recording
+from rebt_ros.storage.recording_head import Origin, read_head
+from rebt_ros.studio.tree_view import Json
+
+#: Follows the name of a recording that is kept, but not learned from.
+LEFT_OUT: Final = ".left-out"
+#: Follows the name of one that goes soon.
+DELETED: Final = ".deleted"
+
+#: How long a deleted demonstration can be had back (seconds).
+UNDO_TIME: Final = 600.0
+
+#: Points of a thumbnail's line, and features that have one.
+_POINTS: Final = 60
+_LINES: Final = 6
+#: Stretches of one action in a thumbnail's band.
+_BANDS: Final = 200
+
+
+@dataclass(slots=True)
+class Shelf:
+    """The demonstrations of one directory.
+
+    Args:
+        directory: Where the recorder writes them; need not be there yet.
+        clock: Tells the time, in seconds since the epoch.
+    """
+
+    directory: Path
+    clock: Callable[[], float] = time.time
+    _known: dict[Path, tuple[tuple[int, int], dict[str, Json]]] = field(default_factory=dict)
+
+    def views(self) -> dict[str, dict[str, Json]]:
+        """All demonstrations by name, oldest first, each with a thumbnail.
+
+        A file that has not changed is not read again.
+        """
+        found = dict(self._files())
+        self._known = {path: known for path, known in self._known.items() if path in found}
+        return {_name(path): self._view(path, suffix) for path, suffix in found.items()}
+
+    def leave_out(self, name: str) -> str:
+        """Keeps a demonstration, but does not learn from it.
+
+        Raises:
+            OptionError: There is none of this name.
+            StorageError: Its file cannot be renamed.
+        """
+        self._rename(name, "", LEFT_OUT)
+        return f"{name} is left out: the next tree is learned without it."
+
+    def take_in(self, name: str) -> str:
+        """Learns from a demonstration again that was left out.
+
+        Raises:
+            OptionError: There is none of this name.
+            StorageError: Its file cannot be renamed.
+        """
+        suffix = next((end for path, end in self._files() if _name(path) == name), "")
+        if suffix not in {LEFT_OUT, ASIDE}:
+            raise OptionError(f"{name} is not left out.")
+        self._rename(name, suffix, "")
+        return f"{name} is taken in: the next tree is learned from it, too."
+
+    def delete(self, name: str) -> str:
+        """Deletes a demonstration, which can be had back for a while.
+
+        Raises:
+            OptionError: There is none of this name.
+            StorageError: Its file cannot be renamed.
+        """
+        suffix = next((end for path, end in self._files() if _name(path) == name), "")
+        self._rename(name, suffix, DELETED)
+        return f"{name} is deleted; for {UNDO_TIME / 60:.0f} minutes it can be had back."
+
+    def restore(self, name: str) -> str:
+        """Takes a deletion back.
+
+        Raises:
+            OptionError: There is none of this name.
+            StorageError: Its file cannot be renamed.
+        """
+        self._rename(name, DELETED, "")
+        return f"{name} is back."
+
+    def tidy(self) -> None:
+        """Destroys what was deleted too long ago to be had back.
+
+        Raises:
+            StorageError: A file cannot be removed.
+        """
+        for path, suffix in self._files():
+            try:
+                # Renaming leaves the time of the last change to the content as it was.
+                if suffix == DELETED and self.clock() - path.stat().st_ctime > UNDO_TIME:
+                    path.unlink(missing_ok=True)
+            except OSError as err:
+                raise StorageError(f"{path} cannot be removed ({err.strerror}).") from err
+
+    def _files(self) -> Iterator[tuple[Path, str]]:
+        """The recordings, and what follows their names."""
+        try:
+            paths = sorted(self.directory.iterdir())
+        except OSError:
+            return
+        for path in paths:
+            for suffix in ("", LEFT_OUT, ASIDE, DELETED):
+                if path.name.endswith(SUFFIX + suffix) and is_recording(path):
+                    yield path, suffix
+
+    def _rename(self, name: str, before: str, after: str) -> None:
+        path = self.directory / f"{name}{SUFFIX}{before}"
+        # A name comes from a browser, and must not lead out of the directory.
+        if path.parent != self.directory or path not in dict(self._files()):
+            raise OptionError(f"there is no demonstration {name!r} any more, or it has changed.")
+        to = path.with_name(f"{name}{SUFFIX}{after}")
+        if to.exists():
+            raise OptionError(f"there is a file {to.name} already: move it elsewhere.")
+        try:
+            path.rename(to)
+        except OSError as err:
+            raise StorageError(f"{path} cannot be renamed ({err.strerror}).") from err
+
+    def _view(self, path: Path, suffix: str) -> dict[str, Json]:
+        try:
+            status = path.stat()
+        except OSError:
+            return {}
+        mark = (status.st_mtime_ns, status.st_size)
+        known = self._known.get(path)
+        if known is None or known[0] != mark:
+            known = (mark, _content(path))
+            self._known[path] = known
+        return {**known[1], "kept": suffix == "", "deleted": suffix == DELETED}
+
+
+def _name(path: Path) -> str:
+    return path.name.rpartition(SUFFIX)[0]
+
+
+def _content(path: Path) -> dict[str, Json]:
+    """What is in a recording."""
+    try:
+        read = read_recording(path)
+        with path.open("rb") as file:
+            origin = read_head(path, file).origin
+    except (RebtError, OSError) as err:
+        return {**_NOTHING, "notes": [str(err)]}
+    shown = read.demonstration
+    if not len(shown):
+        return {**_NOTHING, "notes": ["no rows yet"]}
+    seconds = (shown.stamps - shown.stamps[0]) / 1e9
+    return {
+        "rows": len(shown),
+        "seconds": round(float(seconds[-1]), 3),
+        "start": float(shown.stamps[0]) / 1e9,
+        "origin": origin.value,
+        "actions": dict(Counter(shown.actions[code] for code in shown.chosen.tolist())),
+        "bands": list(_bands(shown, seconds.tolist())),
+        "series": _series(shown, seconds.tolist()),
+        "notes": list(read.notes),
+    }
+
+
+_NOTHING: Final[dict[str, Json]] = {
+    "rows": 0,
+    "seconds": 0.0,
+    "start": 0.0,
+    "origin": Origin.DEMONSTRATION.value,
+    "actions": {},
+    "bands": [],
+    "series": {},
+}
+
+
+def _bands(shown: Demonstration, seconds: list[float]) -> Iterator[list[Json]]:
+    """Stretches of one action: from, to, label."""
+    stretches = []
+    for code, rows in groupby(range(len(shown)), key=shown.chosen.__getitem__):
+        first, *_ = stretch = list(rows)
+        end = min(stretch[-1] + 1, len(shown) - 1)
+        stretches.append([seconds[first], seconds[end], shown.actions[code]])
+    yield from stretches[:_BANDS]
+
+
+def _series(shown: Demonstration, seconds: list[float]) -> dict[str, list[list[float]]]:
+    """Some points of the numeric features that vary."""
+    places = np.unique(np.linspace(0, len(shown) - 1, _POINTS).round().astype(int))
+    series = {}
+    for place, feature in enumerate(shown.features):
+        column = shown.states[places, place]
+        known = np.isfinite(column)
+        if feature.kind is FeatureKind.NUMERIC and known.any() and np.ptp(column[known]) > 0:
+            series[feature.name] = [
+                [seconds[row], value]
+                for row, value in zip(places[known].tolist(), column[known].tolist(), strict=True)
+            ]
+        if len(series) == _LINES:
+            break
+    return series
+
+
+def row_at(shown: Demonstration, seconds: float) -> int:
+    """The last row up to a time since the first one.
+
+    Raises:
+        InputError: There are no rows.
+    """
+    if not len(shown):
+        raise InputError(f"{shown.name} has no rows.")
+    since = (shown.stamps - shown.stamps[0]) / 1e9
+    return max(int(np.searchsorted(since, seconds, side="right")) - 1, 0)

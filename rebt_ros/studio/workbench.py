@@ -1,0 +1,293 @@
+"""What a person works on: what was learned, the draft made of it, and earlier trees."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.document import dumps, loads
+from rebt_ros.behavior_tree.fingerprint import fingerprint
+from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.errors import InputError, OptionError, RebtError
+from rebt_ros.learning.learning import Learning
+from rebt_ros.learning.learning_file import NAME, load_learning
+from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.text import read_text
+from rebt_ros.studio.board import Board, Section
+from rebt_ros.studio.draft import Change, Draft
+from rebt_ros.studio.learning_view import draft_view, learning_view, levels_view
+from rebt_ros.studio.tree_view import Json, published_view
+from rebt_ros.verification.rules import RuleSet
+
+#: Hands a document to who publishes it; returns what that says, and the number of the version.
+Publish = Callable[[str], tuple[str, str]]
+
+_JOURNAL: Final = "journal.json"
+_NAMES: Final = "names.json"
+
+#: Longest name or note that is kept (characters).
+_LONGEST: Final = 200
+
+
+class Workbench:
+    """Keeps the draft in step with what is learned and published, and shows both on the board.
+
+    All methods may be called from any thread; one works at a time.
+
+    Args:
+        board: Where it shows.
+        output: The learner's directory: learning.npz, and the trees published before in trees/.
+        rules: What trees must keep; None: nothing.
+        user: Who works here, for the list of versions.
+    """
+
+    def __init__(self, board: Board, output: Path, rules: RuleSet | None, user: str) -> None:
+        self._board = board
+        self._output = output
+        self._own = output / "studio"
+        self._rules = rules
+        self._user = user
+        self._lock = threading.RLock()
+        self._draft: Draft | None = None
+        self._levels: list[dict[str, Json]] = []
+        self._published: LearnedTree | None = None
+        self._seen: tuple[int, int] | None = None
+        self._versions_seen: tuple[tuple[str, int], ...] = ()
+        self._names = _read_object(self._own / _NAMES)
+        board.replace(Section.NAMES, self._names)
+
+    @property
+    def published(self) -> LearnedTree | None:
+        """The tree that is published."""
+        return self._published
+
+    def take_published(self, document: str) -> LearnedTree:
+        """Notes which tree is published.
+
+        Raises:
+            RebtError: It is none.
+        """
+        learned = loads(document)
+        with self._lock:
+            self._published = learned
+            self._board.replace(Section.TREE, published_view(learned, fingerprint(document)))
+            self._show_draft()
+            self._versions_seen = ()
+        return learned
+
+    def look(self) -> None:
+        """Looks for what was learned or published since; to be called every now and then."""
+        with self._lock:
+            self._look_for_learning()
+            self._look_for_versions()
+
+    def change(self, what: str, change: Change) -> str:
+        """Changes the draft.
+
+        Args:
+            what: In words.
+            change: What to do.
+
+        Returns:
+            What was done, in a sentence.
+
+        Raises:
+            RebtError: It cannot be done.
+        """
+        with self._lock:
+            self._draft = self._there().changed(what, change)
+            self._show_draft()
+        return f"{what[:1].upper()}{what[1:]}: done. Publish to let the robot use it."
+
+    def undo(self) -> str:
+        """Takes the last change of the draft back.
+
+        Raises:
+            OptionError: There is none.
+        """
+        with self._lock:
+            draft = self._there()
+            what = draft.undoes
+            self._draft = draft.undone()
+            self._show_draft()
+        return f"taken back: {what}."
+
+    def redo(self) -> str:
+        """Makes the change again that was taken back last.
+
+        Raises:
+            OptionError: There is none.
+        """
+        with self._lock:
+            draft = self._there()
+            what = draft.redoes
+            self._draft = draft.redone()
+            self._show_draft()
+        return f"done again: {what}."
+
+    def reset(self) -> str:
+        """Goes back to what was learned.
+
+        Raises:
+            OptionError: Nothing was learned.
+        """
+        with self._lock:
+            self._draft = self._there().reset()
+            self._show_draft()
+        return "the draft is what was learned, again."
+
+    @property
+    def learning(self) -> Learning:
+        """The policy of the draft.
+
+        Raises:
+            OptionError: Nothing was learned.
+        """
+        with self._lock:
+            return self._there().learning
+
+    def publish(self, publish: Publish, note: str) -> str:
+        """Has the draft published.
+
+        Args:
+            publish: Does it.
+            note: What it is, for the list of versions; may be empty.
+
+        Raises:
+            RebtError: It was refused, or there is none.
+        """
+        with self._lock:
+            draft = self._there()
+            changes = [step.what for step in draft.steps[1 : draft.place + 1]]
+            document = dumps(draft.learning.learned)
+        message, version = publish(document)
+        self._enter(version, note or "; ".join(changes) or "as learned")
+        return message
+
+    def publish_version(self, publish: Publish, version: str) -> str:
+        """Has a tree published again that was published before.
+
+        Raises:
+            RebtError: It was refused, or there is none.
+        """
+        if not version.isdecimal() or not version.isascii():
+            raise OptionError(f"there is no version {version!r}.")
+        document = read_text(self._output / "trees" / f"{version}.json")
+        message, number = publish(document)
+        self._enter(number, f"version {int(version)} again")
+        return message
+
+    def rename(self, name: str, shown: str) -> str:
+        """Gives an action or a feature another name on the page; nothing else changes.
+
+        Args:
+            name: As it is.
+            shown: As it is to be shown; empty for as it is.
+
+        Raises:
+            StorageError: It cannot be kept.
+        """
+        shown = " ".join(shown.split())[:_LONGEST]
+        with self._lock:
+            names = {key: value for key, value in self._names.items() if key != name}
+            if shown and shown != name:
+                names[name[:_LONGEST]] = shown
+            write_text_atomically(self._own / _NAMES, json.dumps(names, indent=1))
+            self._names = names
+            self._board.replace(Section.NAMES, names)
+        return f"{name} is shown as {shown or name}."
+
+    def _there(self) -> Draft:
+        if self._draft is None:
+            raise OptionError("there is nothing to change yet: learn a tree first.")
+        return self._draft
+
+    def _look_for_learning(self) -> None:
+        path = self._output / NAME
+        try:
+            status = path.stat()
+        except OSError:
+            return
+        seen = (status.st_mtime_ns, status.st_size)
+        if seen == self._seen:
+            return
+        self._seen = seen
+        try:
+            learning = load_learning(path)
+        except InputError as err:
+            self._draft = None
+            self._board.replace(Section.LEARNING, {"problem": str(err)})
+            self._board.replace(Section.DRAFT, {})
+            return
+        self._levels = levels_view(learning)
+        self._draft = Draft.begin(learning)
+        self._show_draft()
+
+    def _show_draft(self) -> None:
+        if self._draft is None:
+            return
+        learning = self._draft.learning
+        self._board.replace(Section.LEARNING, learning_view(learning, self._levels))
+        view = draft_view(self._draft, self._published, self._rules)
+        self._board.replace(Section.DRAFT, view)
+
+    def _look_for_versions(self) -> None:
+        found = sorted((self._output / "trees").glob("[0-9]*.json"))
+        mark = tuple((path.name, _modified(path)) for path in found)
+        if mark == self._versions_seen:
+            return
+        self._versions_seen = mark
+        journal = _read_object(self._own / _JOURNAL)
+        current = dumps(self._published) if self._published else ""
+        self._board.replace(
+            Section.VERSIONS,
+            {path.stem: _version_view(path, journal.get(path.stem), current) for path in found},
+        )
+
+    def _enter(self, version: str, what: str) -> None:
+        """Notes who has published a version, and what it is."""
+        with self._lock:
+            known = {path.stem for path in (self._output / "trees").glob("*.json")}
+            journal = _read_object(self._own / _JOURNAL)
+            kept = {number: entry for number, entry in journal.items() if number in known}
+            kept[version] = {"when": time.time(), "who": self._user, "what": what[:_LONGEST]}
+            write_text_atomically(self._own / _JOURNAL, json.dumps(kept, indent=1))
+            self._versions_seen = ()
+            self._look_for_versions()
+
+
+def _version_view(path: Path, entry: Any, current: str) -> dict[str, Json]:
+    try:
+        text = read_text(path)
+        size = nodes.size(loads(text).tree)
+    except RebtError as err:
+        text, size = str(err), None
+    noted = entry if isinstance(entry, Mapping) else {}
+    return {
+        "when": noted.get("when", _modified(path) / 1e9),
+        "who": noted.get("who", "learner"),
+        "what": noted.get("what", "learned"),
+        "nodes": size,
+        "current": text == current,
+    }
+
+
+def _modified(path: Path) -> int:
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
+def _read_object(path: Path) -> dict[str, Any]:
+    """A JSON object of our own; empty where there is none, or somebody has spoilt it."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
