@@ -27,6 +27,7 @@ LAYERS: Final = (
     {"commands"},
     {"ros"},
     {"live"},
+    {"studio"},
     {PACKAGE},  # rebt_ros/__init__.py, the public interface
     {"offline", "study", "options", "simulation"},
     {"learning", "trial"},
@@ -62,6 +63,7 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 
 #: Libraries with a home: the only modules that import them.
 HOMES: Final = {
+    "aiohttp": ("rebt_ros.ros.studio.server",),
     "apsw": ("rebt_ros.storage.bag_safety",),
     "distributed": ("rebt_ros.study.workers",),
     "imblearn": ("rebt_ros.decision_tree.svm_smote",),

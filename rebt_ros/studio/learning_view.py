@@ -16,7 +16,6 @@ from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.learning import evaluation
 from rebt_ros.learning.learning import Learning
-from rebt_ros.studio.draft import Draft
 from rebt_ros.studio.tree_view import Json, suggestion_views, tree_view
 from rebt_ros.verification.contradictions import agreeing_demands
 from rebt_ros.verification.proof import Answer, check, verdicts
@@ -73,16 +72,15 @@ def learning_view(learning: Learning, levels: Sequence[Json]) -> dict[str, Json]
 
 
 def draft_view(
-    draft: Draft, published: LearnedTree | None, rules: RuleSet | None
+    learning: Learning, published: LearnedTree | None, rules: RuleSet | None
 ) -> dict[str, Json]:
-    """The draft, and what it would change if it were published.
+    """A draft, and what it would change if it were published.
 
     Args:
-        draft: The draft.
+        learning: The policy of the draft.
         published: The tree that is published; None if there is none.
         rules: What trees must keep; None: nothing.
     """
-    learning = draft.learning
     learned = learning.learned
     return {
         "view": tree_view(learned),
@@ -91,8 +89,6 @@ def draft_view(
         "changed": changed_rows(learning, published),
         "words": list(differences_in_words(published, learned)),
         "rules": rules_view(learning, rules),
-        "undo": draft.undoes,
-        "redo": draft.redoes,
         "published": published is not None and dumps(published) == dumps(learned),
     }
 

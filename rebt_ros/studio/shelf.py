@@ -18,7 +18,7 @@ import numpy as np
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.schema import FeatureKind
-from rebt_ros.errors import InputError, OptionError, RebtError
+from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.storage.atomic import StorageError
 from rebt_ros.storage.recording import ASIDE, SUFFIX, is_recording, read_recording
 from rebt_ros.storage.recording_head import Origin, read_head
@@ -220,15 +220,3 @@ def _series(shown: Demonstration, seconds: list[float]) -> dict[str, list[list[f
         if len(series) == _LINES:
             break
     return series
-
-
-def row_at(shown: Demonstration, seconds: float) -> int:
-    """The last row up to a time since the first one.
-
-    Raises:
-        InputError: There are no rows.
-    """
-    if not len(shown):
-        raise InputError(f"{shown.name} has no rows.")
-    since = (shown.stamps - shown.stamps[0]) / 1e9
-    return max(int(np.searchsorted(since, seconds, side="right")) - 1, 0)

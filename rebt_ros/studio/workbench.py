@@ -233,8 +233,9 @@ class Workbench:
             return
         learning = self._draft.learning
         self._board.replace(Section.LEARNING, learning_view(learning, self._levels))
-        view = draft_view(self._draft, self._published, self._rules)
-        self._board.replace(Section.DRAFT, view)
+        view = draft_view(learning, self._published, self._rules)
+        steps = {"undo": self._draft.undoes, "redo": self._draft.redoes}
+        self._board.replace(Section.DRAFT, view | steps)
 
     def _look_for_versions(self) -> None:
         found = sorted((self._output / "trees").glob("[0-9]*.json"))

@@ -29,7 +29,7 @@ COMMANDS = (
     "suggest_rules",
     "trial",
 )
-NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "synthetic_robot")
+NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "studio", "synthetic_robot")
 
 
 @pytest.fixture

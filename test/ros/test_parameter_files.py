@@ -43,7 +43,7 @@ _NEEDED = {"synthetic_robot": ["-p", "config:=tree.json"]}
 _TREE = '{"type_": "sequence", "child_list": [{"type_": "action", "name": "wave"}]}'
 
 
-@pytest.mark.parametrize("node", ["recorder", "learner", "executor", "synthetic_robot"])
+@pytest.mark.parametrize("node", ["recorder", "learner", "executor", "studio", "synthetic_robot"])
 def test_a_parameter_file_lists_every_parameter_with_its_default(node: str, tmp_path: Path) -> None:
     (tmp_path / "tree.json").write_text(_TREE)
     file = CHECKOUT / "config" / f"{node}.yaml"

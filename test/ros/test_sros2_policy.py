@@ -31,6 +31,7 @@ NODES: Final[Mapping[str, Mapping[str, object]]] = {
     "recorder": {},
     "learner": {},
     "executor": {"action_result_topic": "action_result"},
+    "studio": {"port": 0},
 }
 
 
@@ -156,7 +157,12 @@ def test_the_policy_allows_what_the_running_nodes_have_and_nothing_else(tmp_path
             settings = {**parameters, **trees.get(node, {}), "use_sim_time": True}
             running.enter_context(NodeProcess(f"{node}_node", domain, tmp_path, settings))
         # A node reports once it has opened everything.
-        reports = (("recorder", "recording"), ("learner", "learning"), ("executor", "execution"))
+        reports = (
+            ("recorder", "recording"),
+            ("learner", "learning"),
+            ("executor", "execution"),
+            ("studio", "serving"),
+        )
         for node, task in reports:
             peer.wait_until(lambda key=f"{node}: {task}": key in peer.diagnostics, what=node)
             peer.wait_until(

@@ -22,6 +22,7 @@ from rebt_ros.ros.executor import settings as executor_settings
 from rebt_ros.ros.learner import settings as learner_settings
 from rebt_ros.ros.recorder import settings as recorder_settings
 from rebt_ros.ros.robots import demonstrator, robot, synthetic_robot
+from rebt_ros.ros.studio import settings as studio_settings
 
 NODES: Mapping[str, Callable[[Node], object]] = {
     "demonstrator": demonstrator.declare_settings,
@@ -29,6 +30,7 @@ NODES: Mapping[str, Callable[[Node], object]] = {
     "learner": learner_settings.declare_settings,
     "recorder": recorder_settings.declare_settings,
     "robot": robot.declare_settings,
+    "studio": studio_settings.declare_settings,
     "synthetic_robot": synthetic_robot.declare_settings,
 }
 
