@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
@@ -17,11 +17,10 @@ from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
-from rebt_ros.studio.board import Board
+from rebt_ros.learning.learning import Learning
 from rebt_ros.studio.timeline import Moment, Timeline
 from rebt_ros.studio.tree_view import Json
 from rebt_ros.studio.verbs import Answer, Arguments
-from rebt_ros.studio.workbench import Workbench
 from rebt_ros.verification.acting import Step, commanding
 from rebt_ros.verification.describing import value_text
 from rebt_ros.verification.explaining import Explanation, explain
@@ -32,15 +31,20 @@ class Explaining:
     """Answers questions about moments.
 
     Args:
-        workbench: Has the trees.
+        learning: Gives the policy of the draft; raises `OptionError` where there is none.
+        published: Gives the tree that is published.
         timeline: Has the last minutes.
-        board: Has the state as it is now.
     """
 
-    def __init__(self, workbench: Workbench, timeline: Timeline, board: Board) -> None:
-        self._workbench = workbench
+    def __init__(
+        self,
+        learning: Callable[[], Learning],
+        published: Callable[[], LearnedTree | None],
+        timeline: Timeline,
+    ) -> None:
+        self._learning = learning
+        self._published = published
         self._timeline = timeline
-        self._board = board
 
     def moment(self, seconds: float) -> Answer:
         """What was so at a time (seconds since the epoch).
@@ -76,7 +80,7 @@ class Explaining:
         return self._of_moment(moment)
 
     def _of_demonstration(self, name: str, seconds: float) -> Answer:
-        learning = self._workbench.learning
+        learning = self._learning()
         table = learning.table
         row = _row(table, name, seconds)
         values = table.states[row].tolist()
@@ -87,7 +91,7 @@ class Explaining:
         return f"row {row}", told
 
     def _of_moment(self, moment: Moment) -> Answer:
-        learned = self._workbench.published
+        learned = self._published()
         if learned is None:
             raise OptionError("no tree is published yet.")
         values = [_coded(feature, moment.values) for feature in learned.features]
@@ -96,7 +100,7 @@ class Explaining:
             for channel in moment.commands
         }
         try:
-            tables = [self._workbench.learning.table]
+            tables = [self._learning().table]
         except OptionError:
             tables = []
         tables = [table for table in tables if table.features == learned.features]

@@ -143,6 +143,8 @@ def test_the_policy_allows_what_the_running_nodes_have_and_nothing_else(tmp_path
     from rebt_ros.storage.tree_file import write_tree
 
     write_tree(tmp_path / "tree.json", corpus.simple())
+    # The learner publishes it, upon which the studio shows the state.
+    write_tree(tmp_path / "learned" / "tree.json", corpus.simple())
     trees = {"executor": {"tree_file": tmp_path / "tree.json"}}
 
     def found(peer: Peer, node: str) -> Rights:

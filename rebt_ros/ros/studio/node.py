@@ -51,7 +51,9 @@ class StudioNode(Node):
         self._timeline = Timeline()
         self._shelf = Shelf(settings.demonstrations)
         self._workbench = Workbench(self._board, settings.output, rules, settings.user or _login())
-        self._explaining = Explaining(self._workbench, self._timeline, self._board)
+        self._explaining = Explaining(
+            lambda: self._workbench.learning, lambda: self._workbench.published, self._timeline
+        )
         self._calls = Calls(self)
         self._calls.prepare(
             [f"{settings.recorder}/record", f"{settings.executor}/enable"],
