@@ -9,3 +9,5 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 Float32Array: TypeAlias = npt.NDArray[np.float32]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
+#: Bits of sets, 64 to a word.
+WordArray: TypeAlias = npt.NDArray[np.uint64]

@@ -114,7 +114,9 @@ def walk(node: Node) -> Iterator[Node]:
     while waiting:
         node = waiting.pop()
         yield node
-        waiting.extend(reversed(children(node)))
+        # Most nodes are conditions: all proofs and drawings walk, so this is kept quick.
+        if not isinstance(node, Condition):
+            waiting.extend(reversed(children(node)))
 
 
 def size(node: Node) -> int:
@@ -176,6 +178,8 @@ def _ascending(node: Node, numbers: Iterator[int]) -> list[int]:
     """The numbers of the leaves that are actions, those that give way first."""
     if isinstance(node, Action):
         return [next(numbers)]
+    if isinstance(node, Condition):
+        return []
     below = [_ascending(child, numbers) for child in children(node)]
     return [leaf for one in (below[::-1] if isinstance(node, Parallel) else below) for leaf in one]
 

@@ -26,6 +26,7 @@ from rebt_ros.logic.conditions import (
     LastActionIs,
     Literal,
     PreviousActionIs,
+    features_of,
 )
 
 #: Tells in which of the states a condition on the history holds, or for all of them at once.
@@ -121,21 +122,29 @@ class Plan:
     """A tree that is made ready to be evaluated on many states of the same features, many times."""
 
     def __init__(self, tree: nodes.Node, features: tuple[Feature, ...]) -> None:
-        self.actions = nodes.actions(tree)
+        in_order = list(nodes.walk(tree))
+        leaves = [node for node in in_order if isinstance(node, nodes.Action)]
+        self.actions = tuple(dict.fromkeys(leaves))
         """In the order in which the tree names them."""
-        leaves = [node for node in nodes.walk(tree) if isinstance(node, nodes.Action)]
         numbers = {action: number for number, action in enumerate(self.actions)}
         self._leaf_actions = tuple(numbers[leaf] for leaf in leaves)
         ranks = nodes.precedence(tree)
         # From the leaf that has its channel before all others on.
         self._descending = sorted(range(len(leaves)), key=ranks.__getitem__, reverse=True)
-        conditions = dict.fromkeys(one.literal.condition for one in nodes.conditions(tree))
+        conditions = dict.fromkeys(
+            node.literal.condition for node in in_order if isinstance(node, nodes.Condition)
+        )
         self._conditions = tuple(conditions)
         place = {condition: number for number, condition in enumerate(conditions)}
         self._root = _step(tree, place, count())
         # Of what is tested, the columns that are read.
         by_name = {feature.name: number for number, feature in reversed([*enumerate(features)])}
-        read = {by_name[name] for name in nodes.features(tree)}
+        read = {
+            by_name[name]
+            for condition in conditions
+            if not isinstance(condition, PreviousActionIs | LastActionIs)
+            for name in features_of(condition)
+        }
         self._columns = tuple(sorted(read))
         tests = StateTests([features[column] for column in self._columns])
         self._tests = {

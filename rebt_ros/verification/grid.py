@@ -21,9 +21,8 @@ from itertools import permutations
 from typing import Final, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-from rebt_ros.arrays import BoolArray, FloatArray
+from rebt_ros.arrays import BoolArray, FloatArray, WordArray
 from rebt_ros.behavior_tree.condition_tests import StateTests, holds_after
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.schema import Feature, FeatureKind
@@ -46,7 +45,7 @@ from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.formulas import AllOf, AnyOf, Formula
 
 #: Boxes: bits of cells, shape (words, boxes).
-Boxes: TypeAlias = npt.NDArray[np.uint64]
+Boxes: TypeAlias = WordArray
 
 #: The largest number, which is the upper end of the last cell.
 LARGEST: Final = sys.float_info.max

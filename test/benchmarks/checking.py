@@ -22,7 +22,7 @@ _RULES = 20
 
 def check_rules(settings: Settings) -> list[Figure]:
     """Twenty rules of a tree of 200 leaves, and of one of 2,000."""
-    sizes = [(settings.size(900, 60), "200"), (settings.size(9_500, 120), "2,000")]
+    sizes = [(settings.size(500, 60), "200"), (settings.size(5_000, 120), "2,000")]
     return [_checked(settings, rows, leaves) for rows, leaves in sizes]
 
 

@@ -1,0 +1,285 @@
+"""Trees that are lists of branches, each of which acts where its conditions hold.
+
+Most learned trees are: a Selector of Sequences, each with conditions before one action.  The
+conditions of a branch, multiplied out, are *terms*, which all their literals have to meet; and the
+first branch of which a term holds acts.  So boxes need not be pushed through the tree node by node,
+which cuts them into as many pieces as a rule has conditions that may fail.  Instead all boxes are
+split at the same time, each on the condition that most of its terms still ask, until it is known
+which branch is the first: much like the decision tree that the branches came from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, IntArray, WordArray
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.logic.conditions import Condition, Literal
+
+#: Most literals of all terms: where multiplying out gives more, the tree is not read as branches.
+_MOST_LITERALS: Final = 400_000
+#: Boxes times literals that are looked at together.
+_QUESTIONS_AT_A_TIME: Final = 2_000_000
+
+_Term: TypeAlias = tuple[Literal, ...]
+#: Where a condition holds: the words of a box that it is about, and their bits.
+_Mask: TypeAlias = Callable[[Condition], tuple[slice, WordArray]]
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """Acts where one of its terms holds, and no branch before it does."""
+
+    terms: tuple[_Term, ...]
+
+
+def branches_of(tree: nodes.Node) -> tuple[Branch, ...] | None:
+    """The branches of a tree, one for each action leaf in their order.
+
+    Returns:
+        None where the tree is no list of branches, or too large as one.
+    """
+    try:
+        return tuple(Branch(terms) for terms in _Reader().acting(tree, ((),)))
+    except _OtherShape:
+        return None
+
+
+class _OtherShape(Exception):  # noqa: N818 - an answer rather than an error
+    """The tree is no list of branches."""
+
+
+class _Reader:
+    def __init__(self) -> None:
+        self._left = _MOST_LITERALS
+
+    def acting(self, node: nodes.Node, before: tuple[_Term, ...]) -> list[tuple[_Term, ...]]:
+        """The terms of each action leaf of a node, after what was asked before it."""
+        match node:
+            case nodes.Action():
+                return [before]
+            case nodes.Selector(children, memory=False) | nodes.ParallelSelector(children):
+                return [terms for child in children for terms in self.acting(child, before)]
+            case nodes.Parallel(children=(nodes.Action(), *others)) if all(
+                isinstance(other, nodes.Action) for other in others
+            ):
+                # All act at once, and the first one has the channel.
+                return [before, *(() for _ in others)]
+            case nodes.Sequence(children=(*tests, last), memory=False):
+                for test in tests:
+                    before = self._product(before, self._terms(test))
+                return self.acting(last, before)
+            case _:
+                raise _OtherShape
+
+    def _terms(self, node: nodes.Node) -> tuple[_Term, ...]:
+        """The terms of a node without actions."""
+        match node:
+            case nodes.Condition(literal=literal):
+                return ((literal,),)
+            case nodes.Inverter(child=nodes.Condition(literal=literal)):
+                return ((~literal,),)
+            case nodes.Selector(children=children, memory=False):
+                return tuple(term for child in children for term in self._terms(child))
+            case nodes.Sequence(children=children, memory=False):
+                product: tuple[_Term, ...] = ((),)
+                for child in children:
+                    product = self._product(product, self._terms(child))
+                return product
+            case _:
+                raise _OtherShape
+
+    def _product(self, first: tuple[_Term, ...], second: tuple[_Term, ...]) -> tuple[_Term, ...]:
+        if len(first) == 1 and not first[0]:
+            return second
+        self._left -= len(first) * len(second)
+        if self._left < 0:
+            raise _OtherShape
+        product = tuple((*one, *other) for one in first for other in second)
+        if len(product) > len(first):
+            self._left -= sum(map(len, product))
+        return product
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Parted:
+    """Boxes in each of which one branch acts."""
+
+    boxes: WordArray
+    acting: IntArray
+    """Which branch, -1: none, shape (boxes,)."""
+    origin: IntArray
+    """Which box of the start each one is a part of, shape (boxes,)."""
+
+
+def parted(branches: Sequence[Branch], mask: _Mask, start: WordArray) -> Parted:
+    """Splits boxes until it is known of each which branch acts.
+
+    Args:
+        branches: In their order.
+        mask: Where their conditions hold, as `Grid.mask` says.
+        start: The boxes, shape (words, boxes).
+    """
+    return _Parting(branches, mask, len(start)).run(start)
+
+
+@dataclass(eq=False, slots=True)
+class _Front:
+    """Boxes of which it is not yet known which branch acts, and what is left to be asked."""
+
+    boxes: WordArray
+    """Below their words, an empty one for fields of fewer words than others."""
+    best: IntArray
+    """The first branch that is known to hold in all of a box, shape (boxes,)."""
+    origin: IntArray
+    """As in `Parted`."""
+    box: IntArray
+    """The box of each pair of a box and a term that may hold in it, shape (pairs,)."""
+    term: IntArray
+    """Its term, shape (pairs,)."""
+    pair: IntArray
+    """The pair of each question: a pair, and a literal that may fail, shape (questions,)."""
+    literal: IntArray
+    """Its literal, shape (questions,)."""
+    fresh: BoolArray
+    """Which questions the last splits may have answered, shape (questions,)."""
+
+    def decided(self) -> Parted:
+        """Takes away the boxes about which nothing is left to be asked."""
+        waiting = np.zeros(self.boxes.shape[1], dtype=bool)
+        waiting[self.box] = True
+        found = Parted(self.boxes[:-1, ~waiting], self.best[~waiting], self.origin[~waiting])
+        self.box = (np.cumsum(waiting) - 1)[self.box]
+        self.boxes, self.best = self.boxes[:, waiting], self.best[waiting]
+        self.origin = self.origin[waiting]
+        return found
+
+
+class _Parting:
+    def __init__(self, branches: Sequence[Branch], mask: _Mask, words: int) -> None:
+        self._none = len(branches)
+        # Of literals: the condition, and whether it has to hold.
+        number: dict[Condition, int] = {}
+        rank: list[int] = []
+        term: list[int] = []
+        condition: list[int] = []
+        positive: list[bool] = []
+        for place, branch in enumerate(branches):
+            for literals in branch.terms:
+                for literal in literals:
+                    term.append(len(rank))
+                    condition.append(number.setdefault(literal.condition, len(number)))
+                    positive.append(literal.positive)
+                rank.append(place)
+        self._rank = np.array(rank, dtype=np.int64)
+        self._term = np.array(term, dtype=np.int64)
+        self._condition = np.array(condition, dtype=np.int64)
+        self._positive = np.array(positive, dtype=bool)
+        masks = [mask(one) for one in number]
+        width = max((len(bits) for _, bits in masks), default=1)
+        self._words = np.full((width, len(masks)), words)
+        self._masks = np.zeros((width, len(masks)), dtype=np.uint64)
+        for place, (its, bits) in enumerate(masks):
+            self._words[: len(bits), place] = np.arange(its.start, its.stop)
+            self._masks[: len(bits), place] = bits
+
+    def run(self, start: WordArray) -> Parted:
+        """Splits all boxes."""
+        at_a_time = max(1, _QUESTIONS_AT_A_TIME // max(1, len(self._term)))
+        done: list[Parted] = []
+        for first in range(0, max(1, start.shape[1]), at_a_time):
+            done += self._split_up(self._front(start[:, first : first + at_a_time], first))
+        acting = np.concatenate([part.acting for part in done])
+        return Parted(
+            np.concatenate([part.boxes for part in done], axis=1),
+            np.where(acting == self._none, -1, acting),
+            np.concatenate([part.origin for part in done]),
+        )
+
+    def _split_up(self, front: _Front) -> Iterator[Parted]:
+        """Splits boxes until none is left of which it is not known which branch acts."""
+        while True:
+            self._answer(front)
+            yield front.decided()
+            if not len(front.box):
+                return
+            self._split(front)
+
+    def _front(self, start: WordArray, first: int) -> _Front:
+        """Boxes with all questions there are."""
+        count, terms = start.shape[1], len(self._rank)
+        boxes = np.arange(count)
+        return _Front(
+            np.concatenate([start, np.zeros((1, count), dtype=np.uint64)]),
+            np.full(count, self._none),
+            boxes + first,
+            np.repeat(boxes, terms),
+            np.tile(np.arange(terms), count),
+            (boxes[:, np.newaxis] * terms + self._term).reshape(-1),
+            np.tile(np.arange(len(self._term)), count),
+            np.ones(count * len(self._term), dtype=bool),
+        )
+
+    def _answer(self, front: _Front) -> None:
+        """Leaves out what need not be asked any more."""
+        pair, literal = front.pair, front.literal
+        fresh = np.flatnonzero(front.fresh)
+        box = front.box[pair[fresh]]
+        inside, outside = self._sides(front.boxes, box, self._condition[literal[fresh]])
+        positive = self._positive[literal[fresh]]
+        may, must = np.where(positive, inside, outside), np.where(positive, ~outside, ~inside)
+        never = np.zeros(len(front.box), dtype=bool)
+        never[pair[fresh[~may]]] = True
+        unanswered = ~never[pair]
+        unanswered[fresh[must]] = False
+        # A term that is asked nothing holds in all of its box; no later branch acts there.
+        always = ~never
+        always[pair[unanswered]] = False
+        rank = self._rank[front.term]
+        np.minimum.at(front.best, front.box[always], rank[always])
+        kept = ~never & ~always & (rank < front.best[front.box])
+        unanswered &= kept[pair]
+        front.pair = (np.cumsum(kept) - 1)[pair[unanswered]]
+        front.literal = literal[unanswered]
+        front.box, front.term = front.box[kept], front.term[kept]
+
+    def _split(self, front: _Front) -> None:
+        """Splits each box on the condition that is asked most; the insides come first."""
+        count, pairs = front.boxes.shape[1], len(front.box)
+        box, asked = front.box[front.pair], self._condition[front.literal]
+        conditions = self._words.shape[1]
+        keys, votes = np.unique(box * conditions + asked, return_counts=True)
+        # Of each box, the last one in this order stays.
+        keys = keys[np.argsort(votes, kind="stable")]
+        chosen = np.zeros(count, dtype=np.int64)
+        chosen[keys // conditions] = keys % conditions
+        front.boxes = self._halves(front.boxes, chosen)
+        # Questions about other fields are answered as before.
+        front.fresh = np.tile(self._words[0, asked] == self._words[0, chosen[box]], 2)
+        front.best, front.origin = np.tile(front.best, 2), np.tile(front.origin, 2)
+        front.box = np.concatenate([front.box, front.box + count])
+        front.term, front.literal = np.tile(front.term, 2), np.tile(front.literal, 2)
+        front.pair = np.concatenate([front.pair, front.pair + pairs])
+
+    def _sides(
+        self, boxes: WordArray, box: IntArray, asked: IntArray
+    ) -> tuple[BoolArray, BoolArray]:
+        """Whether conditions hold, and do not hold, anywhere in boxes, shape (questions,)."""
+        inside, outside = np.zeros(len(box), dtype=bool), np.zeros(len(box), dtype=bool)
+        for words, masks in zip(self._words, self._masks, strict=True):
+            part, mask = boxes[words[asked], box], masks[asked]
+            inside |= (part & mask) != 0
+            outside |= (part & ~mask) != 0
+        return inside, outside
+
+    def _halves(self, boxes: WordArray, split: IntArray) -> WordArray:
+        inside, outside = boxes.copy(), boxes.copy()
+        places = np.arange(boxes.shape[1])
+        for words, masks in zip(self._words, self._masks, strict=True):
+            inside[words[split], places] &= masks[split]
+            outside[words[split], places] &= ~masks[split]
+        return np.concatenate([inside, outside], axis=1)
