@@ -19,6 +19,7 @@ from rebt_ros.behavior_tree.learned_tree import (
     ChannelProvenance,
     Figures,
     LearnedTree,
+    Mended,
     Provenance,
     Root,
     Suggestion,
@@ -396,6 +397,15 @@ figures = st.builds(
     mean_recall=st.none() | shares,
 )
 ccp_alphas = st.floats(0, allow_nan=False, allow_infinity=False)
+_before_and_after = st.none() | st.tuples(shares, shares)
+mended = st.builds(
+    Mended,
+    added=st.integers(-(10**6), 10**6),
+    rows=st.integers(0, 10**9),
+    changed=st.integers(0, 10**9),
+    agreement=_before_and_after,
+    mean_recall=_before_and_after,
+)
 channel_provenances = st.builds(
     ChannelProvenance,
     channel=names,
@@ -417,6 +427,7 @@ provenances = st.builds(
     channels=st.lists(channel_provenances, max_size=2).map(tuple),
     late_rows=st.integers(0, 10**6),
     late_seconds=st.none() | ccp_alphas,
+    mended=st.none() | mended,
 )
 
 

@@ -16,6 +16,7 @@ from rebt_ros.behavior_tree.learned_tree import (
     ChannelProvenance,
     Figures,
     LearnedTree,
+    Mended,
     Provenance,
     Suggestion,
 )
@@ -307,6 +308,15 @@ _KNOWN: Final[Mapping[Any, Form[Any]]] = {
     Figures: Named("figures", record(Figures)),
 }
 
+_MENDED: Final = record(
+    Mended,
+    Field("added", description="How many nodes the tree has more."),
+    Field("rows", description="How many rows were at hand."),
+    Field("changed", description="In how many of them the tree does something else."),
+    Field("agreement", description="With these rows, before and after; null without rows."),
+    Field("mean_recall", description="Of their actions, before and after."),
+)
+
 _PROVENANCE: Final = record(
     Provenance,
     "demonstrations",
@@ -336,6 +346,13 @@ _PROVENANCE: Final = record(
         Array(record(ChannelProvenance, known=_KNOWN)),
         omitted=True,
         description="Of each channel, where there are several.",
+    ),
+    Field(
+        "mended",
+        _MENDED,
+        omitted=True,
+        description="What guards have changed, so that the tree keeps its rules; all other "
+        "figures are of the tree before.",
     ),
     known=_KNOWN,
 )

@@ -108,6 +108,33 @@ class ChannelProvenance:
 
 
 @dataclass(frozen=True, slots=True)
+class Mended:
+    """What guards have changed of a tree that broke a rule."""
+
+    added: int
+    """How many nodes it has more."""
+    rows: Count
+    """How many rows that were shown were at hand."""
+    changed: Count
+    """In how many of them it does something else."""
+    agreement: tuple[Share, Share] | None
+    """With these rows, teacher-forced, before and after; None without rows."""
+    mean_recall: tuple[Share, Share] | None
+    """The same of their actions, each as much as the others."""
+
+    def __str__(self) -> str:
+        added = f"{self.added:+d} node{'' if abs(self.added) == 1 else 's'}"
+        if self.agreement is None or self.mean_recall is None:
+            return added
+        changed = f"{added}, {self.changed} of {self.rows} rows changed"
+        if not self.changed:
+            return changed
+        before, after = (f"{share:.1%}" for share in self.agreement)
+        recalls = " to ".join(f"{share:.1%}" for share in self.mean_recall)
+        return f"{changed}, agreement with them from {before} to {after}, mean recall {recalls}"
+
+
+@dataclass(frozen=True, slots=True)
 class Provenance:
     """Where a tree came from; with several channels, figures are over all of them."""
 
@@ -126,6 +153,8 @@ class Provenance:
     """How late the demonstrator acted: actions were learned as of so many rows before."""
     late_seconds: Annotated[float, Bounds(0)] | None = None
     """The same in seconds, where stamps tell the time."""
+    mended: Mended | None = None
+    """What guards have changed, if there are any: all other figures are of the tree before."""
 
     @property
     def uses_last_action(self) -> bool:

@@ -127,6 +127,8 @@ class TreeRuntime:
         self._ranks = iter(nodes.precedence(tree))
         self._behaviours = self._build_root(tree)
         self.root = self._behaviours[0]
+        self._places = {id(behaviour): place for place, behaviour in enumerate(self._behaviours)}
+        self._visited: list[tuple[int | None, Status]] = []
 
     def tick(self, state: Sequence[float]) -> Tick:
         """Ticks the tree once.
@@ -135,7 +137,8 @@ class TreeRuntime:
             state: Encoded values in the order of the learned tree's features (see `StateEncoder`).
         """
         self.begin(state)
-        self.root.tick_once()
+        places = self._places
+        self._visited = [(places.get(id(one)), one.status) for one in self.root.tick()]
         done = self.finish()
         return Tick(
             self.root.status,
@@ -189,6 +192,10 @@ class TreeRuntime:
         tip = self.root.tip()
         return tip.name if tip else ""
 
+    def outcomes(self) -> dict[int, str]:
+        """The status names of the nodes that the last `tick` ticked, by places in `nodes.walk`."""
+        return {place: status.name for place, status in self._visited if place is not None}
+
     def halt(self) -> None:
         """Interrupts whatever runs; the next tick starts afresh, with the same histories."""
         self.root.stop(Status.INVALID)
@@ -210,6 +217,7 @@ class TreeRuntime:
         for behaviour in self._behaviours:
             vars(behaviour).clear()
         self._behaviours.clear()
+        self._places.clear()
 
     def _build_root(self, tree: nodes.Node) -> list[py_trees.behaviour.Behaviour]:
         side_by_side = nodes.policies(tree)

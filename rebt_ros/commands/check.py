@@ -74,7 +74,7 @@ def _check(parsed: argparse.Namespace) -> None:
     if parsed.repair is not None:
         mended = check_and_explain.repaired(checked)
         write_tree(parsed.repair, mended.learned)
-        print(f"\nWritten to {parsed.repair}: {mended}; all rules are proven.")
+        print(f"\nWritten to {parsed.repair}: {mended.change}; all rules are proven.")
     elif not checked.keeps_all:
         sys.stdout.flush()
         sys.exit(_NOT_KEPT)
@@ -117,6 +117,10 @@ def _noticeable(findings: Findings, wording: Wording, most: int) -> Iterator[str
 def _divergences(comparison: Comparison, most: int) -> Iterator[str]:
     if not comparison.divergences:
         yield "both do the same in every state."
+    if not comparison.exact:
+        yield "overestimated: of some states below it is not known whether they exist."
+    if comparison.remembers:
+        yield "in a first tick; later ones may differ elsewhere, as a tree remembers where it was."
     for divergence in comparison.divergences:
         what = f"{action_text(divergence.mine)} instead of {action_text(divergence.other)}"
         yield from regions(what, divergence.boxes, comparison.grid, most)

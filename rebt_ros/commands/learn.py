@@ -102,6 +102,18 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
         "BehaviorTree.CPP 4, to DIR/btcpp.xml",
     )
     parser.add_argument(
+        "--rules",
+        type=Path,
+        metavar="FILE",
+        help="rules.yaml (docs/rules.md): where the tree is not proven to keep them, nothing is "
+        "written; rules of the robot file count in any case",
+    )
+    parser.add_argument(
+        "--repair",
+        action="store_true",
+        help="put guards into a tree that breaks a rule, instead of refusing it",
+    )
+    parser.add_argument(
         "--levels",
         action="store_true",
         help="also write every pruning level, from the unpruned tree to a single action, to "
@@ -390,6 +402,8 @@ def _learn(parsed: argparse.Namespace) -> None:
             declared=_declared(parsed),
             levels=parsed.levels,
             most_levels=parsed.most_levels,
+            rules=parsed.rules,
+            repair=parsed.repair,
             progress=progress,
         )
     finally:
@@ -411,6 +425,9 @@ def _learn(parsed: argparse.Namespace) -> None:
             print(f"  - {channel}{reason}")
         if learning.policy.levels is not None:
             print("\n".join(_smaller(channel, learning.policy, learning.policy.levels)))
+    if result.rules:
+        count = len(result.rules)
+        print(f"{'Its rule is' if count == 1 else f'All {count} rules are'} proven.")
     if result.learned.suggestions:
         print("\n".join(_suggestions(result.learned)))
     files = "tree.json, summary.json and pictures of the tree and of its decision tree"

@@ -13,7 +13,9 @@ from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.errors import RebtError
 from rebt_ros.robot_file.reading import read_robot_file
+from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.verification.robot_rules import rules_of
 
 #: Exit codes of a failure that the user can mend, and of Ctrl-C (128 + SIGINT).
 _FAILED, _INTERRUPTED = 1, 130
@@ -146,6 +148,13 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
     )
 
 
+def _robot_file(path: Path) -> RobotFile:
+    robot = read_robot_file(path)
+    # Rules that cannot be read are found at once.
+    rules_of(robot)
+    return robot
+
+
 def input_options(arguments: argparse.Namespace) -> InputOptions:
     """The options that `add_input_options` added."""
     return InputOptions(
@@ -156,7 +165,7 @@ def input_options(arguments: argparse.Namespace) -> InputOptions:
         action_topics=tuple(arguments.action_topic),
         sample_rate=arguments.sample_rate,
         skip_bad=arguments.skip_bad,
-        robot=read_robot_file(arguments.robot) if arguments.robot else None,
+        robot=_robot_file(arguments.robot) if arguments.robot else None,
     )
 
 

@@ -297,8 +297,14 @@ def summary_sentence(learned: LearnedTree) -> str:
             f"learned without them, it agrees with {figures.own_history_agreement:.1%} of "
             f"{figures.held_out_rows} held-out rows"
         )
+    guards = ""
+    if provenance.mended is not None:
+        guards = (
+            f" Guards make it keep its rules: {provenance.mended}; other figures are of the tree "
+            "without them."
+        )
     return (
         f"Learned a behavior tree with {nodes.size(learned.tree)} nodes and "
         f"{len(nodes.actions(learned.tree))} actions from {provenance.rows} rows of "
-        f"{shown} demonstration{'s' if shown != 1 else ''}; {judged}."
+        f"{shown} demonstration{'s' if shown != 1 else ''}; {judged}.{guards}"
     )

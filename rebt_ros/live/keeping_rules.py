@@ -32,6 +32,6 @@ def kept(
         RuleError: It is not proven to keep a rule, or the rules do not fit it.
     """
     if rules is None:
-        return Ruled(learned)
+        return Ruled(learned, ())
     results = Results.REPORTED if action_results else Results.AT_ONCE
     return ruled(learned, rules, tables, results=results, mend=mend)

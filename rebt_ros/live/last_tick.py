@@ -2,56 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.demonstration.last_action import ActionHistory
-from rebt_ros.verification.explaining import explain
+from rebt_ros.verification.acting import Outcome
+from rebt_ros.verification.explaining import explain_tick
 from rebt_ros.verification.explanation_text import lines
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LastTick:
-    """The state of a tick, and what was done before it."""
+    """The state of a tick, and what came of the nodes that were ticked."""
 
     learned: LearnedTree
     values: tuple[float, ...]
     """Of the features of the tree."""
-    taken: tuple[tuple[str, tuple[str, ...], str | None], ...]
-    """Of each channel, what was done before: the distinct actions and the previous one."""
+    outcomes: Mapping[int, str]
+    """From `TreeRuntime.outcomes`."""
 
     def explained(self) -> str:
-        """Which branch acts in that state and why, in lines; see docs/rules.md.
+        """Which branch acted and why, in lines; see docs/rules.md.
 
         Raises:
             RuleError: The tree cannot be explained.
         """
-        histories = {channel: _history(taken, done) for channel, taken, done in self.taken}
-        found = explain(self.learned, self.values, histories, changes=False)
+        outcomes = {place: Outcome[status] for place, status in self.outcomes.items()}
+        found = explain_tick(self.learned, outcomes)
         text: list[str] = []
         for one in found:
             if len(found) > 1:
                 text.append(f"Channel {one.channel}:")
             text += lines(self.learned, self.values, one)
         return "\n".join(text)
-
-
-def last_tick(
-    learned: LearnedTree, values: Sequence[float], histories: Mapping[str, ActionHistory]
-) -> LastTick:
-    """Notes a state, before the tree is ticked.
-
-    Args:
-        learned: The tree.
-        values: Of its features.
-        histories: What was done before, by channel.
-    """
-    taken = tuple((name, one.taken, one.previous) for name, one in histories.items())
-    return LastTick(learned, tuple(values), taken)
-
-
-def _history(taken: Sequence[str], previous: str | None) -> ActionHistory:
-    history = ActionHistory(taken)
-    history.previous = previous
-    return history

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from rebt_ros.learning.learning import Learning
     from rebt_ros.learning.options import LearnOptions
     from rebt_ros.offline.result import OfflineLearning
+    from rebt_ros.verification.ruling import Ruled
 
 #: Of all the work, what reading the recordings is.
 _READING: Final = 0.1
@@ -176,7 +177,8 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
         lambda stage, share: tell(Progress(stage, _READING + (1.0 - _READING) * share)),
     )
     demonstrations = [read.demonstration for read in reads]
-    learned, mended = _ruled(pipeline.side_by_side(learnings), request, demonstrations)
+    kept = _ruled(pipeline.side_by_side(learnings), request, demonstrations)
+    learned = kept.learned
     notes = [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
     notes += [note for learning in learnings for note in learning.notes]
     led = {
@@ -184,10 +186,8 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
         for learning in learnings
     }
     sentences = [f"{channel}{one.in_short()}" for channel, one in led.items() if one.in_short()]
-    if mended:
-        sentences.append(f"Guards make it keep its rules: {mended}.")
     accounts = {read.demonstration.name: read.account for read in reads if read.account}
-    result = OfflineLearning(learned, learnings, tuple(notes), accounts)
+    result = OfflineLearning(learned, learnings, tuple(notes), accounts, kept.rules)
     lesson = Lesson(
         dumps(learned),
         " ".join((pipeline.summary_sentence(learned), *sentences)),
@@ -205,24 +205,23 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
 
 def _ruled(
     learned: LearnedTree, request: Request, demonstrations: Sequence[Demonstration]
-) -> tuple[LearnedTree, str]:
-    """The tree as it keeps its rules, and what guards have changed.
+) -> Ruled:
+    """The tree as it keeps its rules.
 
     Raises:
         RebtError: The rules cannot be read, or it does not keep them.
     """
     from rebt_ros.learning.replaying import rows_for
     from rebt_ros.live.keeping_rules import kept
-    from rebt_ros.offline.rules_files import read_rules
+    from rebt_ros.offline.rules_files import rules_for
     from rebt_ros.verification.errors import RuleError
 
-    if not request.rules:
-        return learned, ""
     try:
-        ruled = kept(
+        rules = rules_for(request.rules, learned.robot)
+        return kept(
             learned,
-            read_rules(Path(request.rules)),
-            rows_for(learned, demonstrations),
+            rules,
+            rows_for(learned, demonstrations) if rules else (),
             action_results=request.action_results,
             mend=request.repair,
         )
@@ -230,7 +229,6 @@ def _ruled(
         raise RuleError(
             f"the learned tree is not published, and the tree before it stays: {err}"
         ) from err
-    return ruled.learned, ruled.mended
 
 
 def write(learned: Learned, directory: Path) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable, history_at
 from rebt_ros.errors import OptionError
 from rebt_ros.learning.replaying import rows_for
-from rebt_ros.offline.rules_files import read_rules
+from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.offline.trees_and_rows import as_learned_tree, demonstrations_for
 from rebt_ros.storage.inputs import InputOptions
 from rebt_ros.verification.comparing import Comparison, compare
@@ -74,7 +74,7 @@ def check(
 
     Args:
         tree: A learned tree, or the file of one.
-        rules: Rules, or the file of some.
+        rules: Rules, or the file of some, beside those of the robot file that the tree carries.
         inputs: What was shown: bags, recordings and CSV tables.
         against: Another tree, or its file, that the tree is compared with.
         reading: How to read the inputs.
@@ -84,7 +84,7 @@ def check(
         RebtError: A file cannot be used, or rules do not fit the tree or each other.
     """
     learned = as_learned_tree(tree)
-    ruled = rules if isinstance(rules, RuleSet) or rules is None else read_rules(rules)
+    ruled = rules_for(rules, learned.robot)
     asked = () if ruled is None else agreeing_demands(ruled, learned)
     tables = _rows(learned, inputs, reading)
     proofs = prove(learned, asked, tables, results)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, unmeasurable
+from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.drawing.text import render_text
@@ -18,6 +19,7 @@ from rebt_ros.learning.learning_file import write_learning
 from rebt_ros.learning.levels import check_most_levels
 from rebt_ros.learning.options import LearnOptions
 from rebt_ros.learning.progress import Progress
+from rebt_ros.learning.replaying import rows_for
 from rebt_ros.offline.level_files import (
     channel_directories,
     clear_levels,
@@ -26,8 +28,12 @@ from rebt_ros.offline.level_files import (
     write_levels,
 )
 from rebt_ros.offline.result import OfflineLearning, write_summary
+from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.inputs import InputOptions, as_paths, load
+from rebt_ros.verification.errors import BrokenRuleError, RuleError
+from rebt_ros.verification.rules import RuleSet
+from rebt_ros.verification.ruling import Ruled, ruled
 
 #: Names that ROS 2 has for topics.
 _TOPIC = re.compile(r"/?(?:[A-Za-z_]\w*/)*[A-Za-z_]\w*", re.ASCII)
@@ -48,6 +54,8 @@ def learn(
     declared: Mapping[str, FeatureKind] | None = None,
     levels: bool = False,
     most_levels: int = 100,
+    rules: str | Path | None = None,
+    repair: bool = False,
     progress: Progress = lambda stage, share: None,
 ) -> OfflineLearning:
     """Learns a behavior tree from bags, recordings and CSV tables.
@@ -63,14 +71,19 @@ def learn(
         levels: Whether all pruning levels are written as well, to levels/ beside each decision
             tree.
         most_levels: If so, this many at most.
+        rules: File of the rules that the tree must keep, beside the rules of the robot file by
+            which the inputs were recorded or are read; see docs/rules.md.
+        repair: Whether guards are put into a tree that breaks a rule, instead of refusing it.
         progress: Told what is being done and which share of the work is behind.
 
     Raises:
-        RebtError: An input cannot be used or an option makes no sense; nothing was written.
+        RebtError: An input cannot be used, an option makes no sense, or the tree is not proven to
+            keep its rules; nothing was written.
     """
     options = options or LearnOptions()
     if levels:
         check_most_levels(most_levels)
+    given = rules_for(rules)
     progress("reading", 0.0)
     paths = as_paths(inputs)
     reading = reading or InputOptions()
@@ -78,14 +91,19 @@ def learn(
     tables = tuple(
         replace(table, robot=loaded.robot) for table in tabulate(loaded.demonstrations, declared)
     )
+    asked = rules_for(given, loaded.robot)
     learning = _part(progress, 0.0, _LEARNING_SHARE) if levels else progress
     for table in tables:
         _refuse_what_are_no_actions(table)
     learnings = pipeline.learn_channels(tables, options, learning)
     further = (note for learning in learnings for note in learning.notes)
     learned = pipeline.side_by_side(learnings)
+    proven: tuple[str, ...] = ()
+    if asked is not None:
+        kept = _ruled(learned, asked, loaded.demonstrations, repair)
+        learned, proven = kept.learned, kept.rules
     notes = (*loaded.notes, *further, *_not_on_a_robot(learned))
-    result = OfflineLearning(learned, learnings, notes, loaded.accounts)
+    result = OfflineLearning(learned, learnings, notes, loaded.accounts, proven)
     if out is not None:
         writing = _part(progress, _LEARNING_SHARE, 1.0)
         most = most_levels if levels else 0
@@ -122,6 +140,23 @@ def write_files(
     result = replace(result, notes=(*result.notes, *missing))
     write_summary(directory, result, list(map(str, inputs)), options)
     return result
+
+
+def _ruled(
+    learned: LearnedTree, rules: RuleSet, demonstrations: Sequence[Demonstration], repair: bool
+) -> Ruled:
+    """The tree as it keeps its rules.
+
+    Raises:
+        RuleError: It does not keep them.
+    """
+    try:
+        return ruled(learned, rules, rows_for(learned, demonstrations), mend=repair)
+    except BrokenRuleError as err:
+        raise RuleError(
+            f"nothing is written: {err} Show what should be done there, or let --repair put guards "
+            "into the tree."
+        ) from err
 
 
 def _not_on_a_robot(learned: LearnedTree) -> Iterator[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,8 @@ class OfflineLearning:
     """What a person should know about the inputs; no full stops."""
     accounts: Mapping[str, Account] = field(default_factory=dict)
     """Where what each demonstration's file holds went."""
+    rules: tuple[str, ...] = ()
+    """The rules that the tree was proven to keep, each in a line."""
 
 
 def write_summary(
@@ -60,7 +62,7 @@ def summarize(result: OfflineLearning) -> dict[str, Any]:
     """The figures of a learned tree, as written to summary.json."""
     learned, provenance = result.learned, result.learned.provenance
     figures = provenance.figures
-    summary = {
+    summary: dict[str, Any] = {
         "rows": provenance.rows,
         "demonstrations": provenance.demonstrations,
         "features": [feature.name for feature in learned.features],
@@ -91,6 +93,10 @@ def summarize(result: OfflineLearning) -> dict[str, Any]:
             for suggestion in learned.suggestions
         ],
     }
+    if result.rules:
+        summary["rules"] = [{"rule": rule, "answer": "proven"} for rule in result.rules]
+    if provenance.mended is not None:
+        summary["mended"] = asdict(provenance.mended)
     if len(result.learnings) == 1:
         return summary | _choices(result.learnings[0])
     return summary | {

@@ -13,6 +13,8 @@ from rebt_ros.robot_file.robot_file import Json
 
 #: Line of each place by the keys that lead there; empty where the value was no text.
 Lines: TypeAlias = Mapping[tuple[str, ...], int]
+#: Line and column of each text by the keys that lead there, behind its quote if it has one.
+Starts: TypeAlias = Mapping[tuple[str, ...], tuple[int, int]]
 
 _E = TypeVar("_E", bound=Enum)
 
@@ -29,13 +31,27 @@ class Place:
         name: Name of the file.
         lines: Where which line is.
         path: Keys that lead there.
+        starts: Where which text starts.
     """
 
-    def __init__(self, value: Json, name: str, lines: Lines, path: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self,
+        value: Json,
+        name: str,
+        lines: Lines,
+        path: tuple[str, ...] = (),
+        starts: Starts | None = None,
+    ) -> None:
         self.value = value
         self._name = name
         self._lines = lines
         self._path = path
+        self._starts = starts or {}
+
+    @property
+    def start(self) -> tuple[int, int] | None:
+        """Line and column of its text, from 1; None where that is not known."""
+        return self._starts.get(self._path)
 
     def refuse(self, why: str) -> NoReturn:
         """Refuses the file.
@@ -71,14 +87,14 @@ class Place:
         if not isinstance(self.value, dict):
             self.must_be("a map")
         for key, value in self.value.items():
-            yield key, Place(value, self._name, self._lines, (*self._path, key))
+            yield key, Place(value, self._name, self._lines, (*self._path, key), self._starts)
 
     def elements(self) -> list[Place]:
         """The elements of a list."""
         if not isinstance(self.value, list):
             self.must_be("a list")
         return [
-            Place(value, self._name, self._lines, (*self._path, str(place)))
+            Place(value, self._name, self._lines, (*self._path, str(place)), self._starts)
             for place, value in enumerate(self.value)
         ]
 

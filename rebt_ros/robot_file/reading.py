@@ -33,11 +33,14 @@ from rebt_ros.robot_file.robot_file import (
     StateFeature,
     TopicSettings,
     TwistActions,
+    WrittenRule,
 )
 from rebt_ros.robot_file.text import LARGEST, read_yaml
 
 #: Most features, and most of anything else that is listed.
 MOST: Final = 1000
+#: Most rules.
+MOST_RULES: Final = 500
 
 #: Sectors of a Twist where none are named (degrees).
 _SECTORS: Final[Mapping[str, float]] = {"forward": 0.0, "left": 90.0, "back": 180.0, "right": -90.0}
@@ -82,8 +85,8 @@ def parse_robot_file(text: str, name: str = "the robot file") -> RobotFile:
     Raises:
         RobotFileError: One sentence says what is wrong in which line.
     """
-    content, lines = read_yaml(text, name)
-    return _robot_file(Place(content, name, lines), name, content)
+    content, lines, starts = read_yaml(text, name)
+    return _robot_file(Place(content, name, lines, starts=starts), name, content)
 
 
 def robot_file_of(content: Json, name: str) -> RobotFile:
@@ -128,7 +131,7 @@ class CarriedRobotFile(Form[RobotFile]):
 def _robot_file(place: Place, name: str, content: Json) -> RobotFile:
     if place.value is None:
         place.refuse("is empty: it needs a part 'state'")
-    fields = place.fields("topics", "state", "actions", "commands")
+    fields = place.fields("topics", "state", "actions", "commands", "rules")
     if "state" not in fields:
         place.refuse("needs a part 'state' that names the features")
     state = tuple(_feature(key, its) for key, its in _listed(fields["state"]))
@@ -150,7 +153,10 @@ def _robot_file(place: Place, name: str, content: Json) -> RobotFile:
         if "commands" in fields
         else {}
     )
-    robot = RobotFile(name, state, actions, topics, commands, content)
+    rules = tuple(map(_rule, fields["rules"].elements())) if "rules" in fields else ()
+    if len(rules) > MOST_RULES:
+        fields["rules"].refuse(f"has {len(rules)} rules: at most {MOST_RULES} are read")
+    robot = RobotFile(name, state, actions, topics, commands, rules, content)
     used = {*robot.state_topics, *robot.action_topics}
     for key, its in _listed(fields["topics"]) if "topics" in fields else ():
         if key not in used:
@@ -343,6 +349,25 @@ def _goal_command(place: Place) -> Command:
     return GoalCommand(fields["action"].text(), fields["type"].text(), _content(fields, "goal"))
 
 
+def _rule(place: Place) -> WrittenRule:
+    fields = place.fields(*_RULE_KINDS, "when", "channel")
+    kinds = [kind for kind in _RULE_KINDS if kind in fields]
+    if len(kinds) != 1:
+        place.refuse(f"needs exactly one of {', '.join(_RULE_KINDS)}, with an action")
+    kind = kinds[0]
+    if kind == "only" and "when" not in fields:
+        place.refuse("needs a 'when', as it is an 'only'")
+    when = fields.get("when")
+    return WrittenRule(
+        kind,
+        fields[kind].text(),
+        "" if when is None else when.text(),
+        fields["channel"].text() if "channel" in fields else "",
+        fields[kind].start,
+        None if when is None else when.start,
+    )
+
+
 def _of_a_kind(place: Place, name: str, *others: str) -> dict[str, Place]:
     fields = place.fields(name, "type", *others)
     if "type" not in fields:
@@ -365,6 +390,9 @@ def _labels(fields: Mapping[str, Place], name: str) -> dict[str, str]:
 def _emit(fields: Mapping[str, Place]) -> Emit:
     return fields["emit"].one_of(Emit) if "emit" in fields else Emit.MESSAGE
 
+
+#: What a rule can demand.
+_RULE_KINDS: Final = ("never", "always", "only")
 
 #: What a source is by the key that names its topic.
 _SOURCES: Final[Mapping[str, Callable[[Place], ActionSource]]] = {

@@ -171,6 +171,23 @@ STOP: Final = "stop"
 
 
 @dataclass(frozen=True, slots=True)
+class WrittenRule:
+    """A rule that trees must keep, as it is written; `rebt_ros.verification` reads what it says."""
+
+    kind: str
+    """The word that it begins with."""
+    action: str
+    when: str = ""
+    """The condition; empty: everywhere."""
+    channel: str = ""
+    """Empty where the label of the action tells the channel."""
+    action_start: tuple[int, int] | None = field(default=None, compare=False)
+    """Line and column of the action, from 1; None where that is not known."""
+    when_start: tuple[int, int] | None = field(default=None, compare=False)
+    """The same of the condition."""
+
+
+@dataclass(frozen=True, slots=True)
 class RobotFile:
     """Where features and actions are, and what labels do."""
 
@@ -182,6 +199,8 @@ class RobotFile:
     topics: Mapping[str, TopicSettings] = field(default_factory=dict)
     commands: Mapping[str, Command] = field(default_factory=dict)
     """By label."""
+    rules: tuple[WrittenRule, ...] = ()
+    """What trees must keep."""
     content: Json = field(default=None, compare=False)
     """What it was read from, for recordings and trees to carry."""
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 import yaml
 
 from rebt_ros.robot_file.errors import RobotFileError
-from rebt_ros.robot_file.place import Lines
+from rebt_ros.robot_file.place import Lines, Starts
 from rebt_ros.robot_file.robot_file import Json
 
 #: Longest robot file, in characters.
@@ -33,7 +33,7 @@ _WORDS: Final = {
 }
 
 
-def read_yaml(text: str, name: str) -> tuple[Json, Lines]:
+def read_yaml(text: str, name: str) -> tuple[Json, Lines, Starts]:
     """Reads YAML.
 
     Args:
@@ -41,7 +41,7 @@ def read_yaml(text: str, name: str) -> tuple[Json, Lines]:
         name: Name of its file, for messages.
 
     Returns:
-        The value, and the line of each place in it.
+        The value, the line of each place in it, and the line and column of each text.
 
     Raises:
         RobotFileError: It is no YAML, or uses what is not read.
@@ -63,8 +63,9 @@ class _Reader:
     def __init__(self, name: str) -> None:
         self._name = name
         self._lines: dict[tuple[str, ...], int] = {}
+        self._starts: dict[tuple[str, ...], tuple[int, int]] = {}
 
-    def document(self, events: Iterator[Any]) -> tuple[Json, Lines]:
+    def document(self, events: Iterator[Any]) -> tuple[Json, Lines, Starts]:
         for event in events:
             if isinstance(event, yaml.StreamStartEvent | yaml.DocumentStartEvent):
                 continue
@@ -75,8 +76,8 @@ class _Reader:
             further = next(events)
             if not isinstance(further, yaml.StreamEndEvent):
                 self._refuse(further, "a second document begins: leave one")
-            return value, self._lines
-        return None, self._lines
+            return value, self._lines, self._starts
+        return None, self._lines, self._starts
 
     def _value(self, event: Any, events: Iterator[Any], path: tuple[str, ...]) -> Json:
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
@@ -87,6 +88,9 @@ class _Reader:
             self._refuse(event, f"this is nested more than {DEEPEST} levels deep")
         self._lines[path] = event.start_mark.line + 1
         if isinstance(event, yaml.ScalarEvent):
+            mark = event.start_mark
+            quoted = event.style is not None and event.style in "'\""
+            self._starts[path] = (mark.line + 1, mark.column + 1 + quoted)
             return self._scalar(event)
         if isinstance(event, yaml.SequenceStartEvent):
             return self._list(events, path)

@@ -17,6 +17,7 @@ from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.ros.graph_watch import Finding
 from rebt_ros.ros.message_types import installed, message_class
 from rebt_ros.ros.parameters import Parameters, at_home
+from rebt_ros.verification.robot_rules import rules_of
 
 
 def robot_file(declare: Parameters) -> RobotFile | None:
@@ -24,6 +25,7 @@ def robot_file(declare: Parameters) -> RobotFile | None:
 
     Raises:
         RobotFileError: There is no such file, or it is malformed.
+        RuleError: One of its rules is.
     """
     path = declare.text(
         "robot_file",
@@ -31,7 +33,10 @@ def robot_file(declare: Parameters) -> RobotFile | None:
         "Robot file that says where features and actions are in messages of any type, and what "
         "labels do; empty for none.",
     )()
-    return read_robot_file(at_home("robot_file", path)) if path else None
+    robot = read_robot_file(at_home("robot_file", path)) if path else None
+    # Rules that cannot be read are found before anything is recorded or run.
+    rules_of(robot)
+    return robot
 
 
 class RobotTopics:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -34,6 +34,8 @@ class Step:
     """Those of its children that were ticked."""
     leaf: int = -1
     """Of an action: its place among the action leaves of the tree."""
+    skipped: int = 0
+    """How many of its children come before the first that was ticked, as it goes on there."""
 
     def walk(self) -> Iterator[Step]:
         """This step and all below it, in the order of the ticks."""
@@ -65,11 +67,48 @@ def trace(
     return _Tick(States(tuple(features), row, as_it_stands(history))).of(tree, 0)
 
 
+def recorded(tree: nodes.Node, outcomes: Mapping[int, Outcome], first: int = 0) -> Step | None:
+    """A tick that was done, whatever was remembered before it.
+
+    Args:
+        tree: The tree of one channel, as it was executed.
+        outcomes: What came of the nodes that were ticked, by their places.
+        first: The place of the tree's root.
+
+    Returns:
+        None if its root was not ticked.
+    """
+    return _recorded(tree, outcomes, first, 0)
+
+
+def _recorded(
+    node: nodes.Node, outcomes: Mapping[int, Outcome], place: int, leaf: int
+) -> Step | None:
+    if place not in outcomes:
+        return None
+    if isinstance(node, nodes.Action):
+        return Step(node, outcomes[place], leaf=leaf)
+    steps: list[Step] = []
+    skipped = 0
+    below = place + 1
+    for child in nodes.children(node):
+        step = _recorded(child, outcomes, below, leaf)
+        if step is not None:
+            steps.append(step)
+        elif not steps:
+            skipped += 1
+        below += nodes.size(child)
+        leaf += sum(isinstance(one, nodes.Action) for one in nodes.walk(child))
+    return Step(node, outcomes[place], tuple(steps), skipped=skipped if steps else 0)
+
+
 def commanding(traced: Step, tree: nodes.Node) -> Step | None:
     """The step whose action is the command; None if there is none."""
     ranks = nodes.precedence(tree)
     acting = [step for step in traced.walk() if step.leaf >= 0]
-    return max(acting, key=lambda step: ranks[step.leaf], default=None)
+    return max(
+        acting, key=lambda step: (step.outcome is Outcome.RUNNING, ranks[step.leaf]), default=None
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,9 @@ from rebt_ros.verification.acting import acting_leaves
 from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.grid import Boxes, Grid
 from rebt_ros.verification.proof import grid_of, policies_of
-from rebt_ros.verification.sweep import Results, Sweep, Ticks, sweep
+from rebt_ros.verification.reference import of_tree
+from rebt_ros.verification.states import possible_boxes
+from rebt_ros.verification.sweep import Results, Sweep, Ticks, remembers, sweep
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -38,14 +40,17 @@ class Comparison:
     grid: Grid
     divergences: tuple[Divergence, ...]
     """Those in which most rows lie come first."""
+    exact: bool
+    """Whether all of these states exist: differences of features that no numbers have are left out,
+    as far as it could be found out."""
+    remembers: bool
+    """Whether a tree remembers, so that later ticks may differ elsewhere as well."""
 
 
 def compare(
     mine: LearnedTree, other: LearnedTree, tables: Sequence[DemonstrationTable] = ()
 ) -> tuple[Comparison, ...]:
     """Where two trees differ, channel by channel.
-
-    A difference of two features counts as free of them, so that some states may not exist.
 
     Args:
         mine: A tree.
@@ -98,14 +103,21 @@ def _compared(
         if pair[0] != pair[1]:
             pairs.setdefault(pair, []).append(place)
     rows = _rows(mine, other, first, second, table)
-    found = [
-        Divergence(*pair, second.boxes[:, places], None if rows is None else rows.get(pair, 0))
-        for pair, places in pairs.items()
-    ]
+    shown = of_tree(learned, channel)
+    exact = True
+    found = []
+    for pair, places in pairs.items():
+        boxes, known = possible_boxes(second.boxes[:, places], grid, learned.features, shown)
+        exact = exact and known
+        if boxes.shape[1]:
+            count = None if rows is None else rows.get(pair, 0)
+            found.append(Divergence(*pair, boxes, count))
     return Comparison(
         channel,
         grid,
         tuple(sorted(found, key=lambda its: (-(its.rows or 0), -its.boxes.shape[1]))),
+        exact,
+        remembers(mine, Results.AT_ONCE) or remembers(other, Results.AT_ONCE),
     )
 
 

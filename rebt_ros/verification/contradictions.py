@@ -24,15 +24,14 @@ def agreeing_demands(rules: RuleSet, learned: LearnedTree) -> tuple[Demand, ...]
         RuleError: They do not fit the tree, or contradict each other.
     """
     asked = demands(rules, learned)
-    refuse_contradictions(rules.source, asked, learned)
+    refuse_contradictions(asked, learned)
     return asked
 
 
-def refuse_contradictions(source: str, asked: Sequence[Demand], learned: LearnedTree) -> None:
+def refuse_contradictions(asked: Sequence[Demand], learned: LearnedTree) -> None:
     """Refuses rules of which no tree can keep all, and rules about no state at all.
 
     Args:
-        source: Name of the file of rules, for the message.
         asked: The rules.
         learned: A tree that knows their features and actions; what it does does not matter.
 
@@ -43,15 +42,15 @@ def refuse_contradictions(source: str, asked: Sequence[Demand], learned: Learned
         with contextlib.suppress(Unsettled):
             if _state_of(demand.when, demand, learned) is None:
                 raise RuleError(
-                    f"{source}, {demand.rule.place}: the condition of '{demand.rule}' never "
+                    f"{demand.rule.place}: the condition of '{demand.rule}' never "
                     "holds: no state is like that."
                 )
     for first, second in combinations(asked, 2):
         with contextlib.suppress(Unsettled):
-            _refuse_clash(source, first, second, learned)
+            _refuse_clash(first, second, learned)
 
 
-def _refuse_clash(source: str, first: Demand, second: Demand, learned: LearnedTree) -> None:
+def _refuse_clash(first: Demand, second: Demand, learned: LearnedTree) -> None:
     both = _clash(first, second)
     point = None if both is None else _state_of(both, first, learned)
     if both is None or point is None:
@@ -59,7 +58,7 @@ def _refuse_clash(source: str, first: Demand, second: Demand, learned: LearnedTr
     state = point_text(point, grid_of(learned, [], [both]), learned.features)
     where = f", as where {state}" if state else ""
     raise RuleError(
-        f"{source}, {second.rule.place}: '{second.rule}' contradicts '{first.rule}' of "
+        f"{second.rule.place}: '{second.rule}' contradicts '{first.rule}' of "
         f"{first.rule.place}{where}: make a condition narrower."
     )
 

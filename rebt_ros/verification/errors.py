@@ -8,3 +8,7 @@ class RuleError(RebtError):
 
     The message begins with the place: a file, a line and a column, from 1.
     """
+
+
+class BrokenRuleError(RuleError):
+    """A tree is not proven to keep its rules; the message names the rule, and a state."""

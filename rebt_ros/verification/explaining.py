@@ -15,7 +15,14 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import LastActionIs, PreviousActionIs, features_of
-from rebt_ros.verification.acting import Step, acting_leaves, commanding, trace
+from rebt_ros.verification.acting import (
+    Outcome,
+    Step,
+    acting_leaves,
+    commanding,
+    recorded,
+    trace,
+)
 from rebt_ros.verification.grid import Boxes, Field, Grid
 from rebt_ros.verification.proof import grid_of, policies_of
 from rebt_ros.verification.reference import Reference, of_table, of_tree
@@ -103,6 +110,34 @@ def explain(
     )
 
 
+def explain_tick(learned: LearnedTree, outcomes: Mapping[int, Outcome]) -> tuple[Explanation, ...]:
+    """Why a tree did in a tick what it did, channel by channel, whatever it remembered.
+
+    Args:
+        learned: The tree.
+        outcomes: What came of the nodes that were ticked, by their places in its executable form.
+
+    Raises:
+        RuleError: The tree cannot be explained.
+    """
+    policies = policies_of(learned)
+    # Several channels are side by side under a root of their own.
+    place = 0 if len(policies) < 2 else 1
+    found = []
+    for channel, tree in policies.items():
+        traced = recorded(tree, outcomes, place)
+        place += nodes.size(tree)
+        if traced is not None:
+            acting = commanding(traced, tree)
+            grid = grid_of(learned, [tree])
+            found.append(Explanation(channel, traced, _action_of(acting), None, None, grid))
+    return tuple(found)
+
+
+def _action_of(acting: Step | None) -> nodes.Action | None:
+    return acting.node if acting is not None and isinstance(acting.node, nodes.Action) else None
+
+
 def _explained(
     learned: LearnedTree,
     channel: str,
@@ -114,7 +149,7 @@ def _explained(
 ) -> Explanation:
     traced = trace(tree, learned.features, values, history)
     acting = commanding(traced, tree)
-    action = acting.node if acting is not None and isinstance(acting.node, nodes.Action) else None
+    action = _action_of(acting)
     grid = grid_of(learned, [tree])
     flips: tuple[Flip, ...] | None = None
     if changes:

@@ -27,15 +27,22 @@ def lines(learned: LearnedTree, values: Sequence[float], explained: Explanation)
     words = _Words(learned, values)
     yield f"{action_text(explained.action)}"
     branches = _branches(explained.trace)
-    for branch in branches:
-        if branch.acts:
-            reasons = ", ".join(words.reasons(branch)) or "no branch before it acts"
-            yield f"  because {reasons}"
-    passed = [branch for branch in branches if not branch.acts]
+    # A branch whose action failed leaves the tick to those after it.
+    acting = [
+        branch for branch in branches if branch.acts and branch.outcome is not Outcome.FAILURE
+    ] or [branch for branch in branches if branch.acts][-1:]
+    for branch in acting:
+        yield from _remembered(branch)
+        fallback = "it goes on" if _goes_on(branch) else "no branch before it acts"
+        yield f"  because {', '.join(words.reasons(branch)) or fallback}"
+    passed = [branch for branch in branches if branch not in acting]
     if passed:
         yield "  Branches before it that did not act:" if explained.action else "  No branch acts:"
         for branch in passed:
-            yield f"    {_named(branch.node)}: does not hold: {', '.join(words.failures(branch))}"
+            why = f"does not hold: {', '.join(words.failures(branch))}"
+            if branch.acts:
+                why = "was taken, and failed"
+            yield f"    {_named(branch.node)}: {why}"
     if explained.support is not None:
         yield from _supported(explained.support)
     if explained.flips:
@@ -48,6 +55,21 @@ def lines(learned: LearnedTree, values: Sequence[float], explained: Explanation)
 
 def _branches(traced: Step) -> tuple[Step, ...]:
     return traced.children if isinstance(traced.node, nodes.Selector) else (traced,)
+
+
+def _goes_on(branch: Step) -> bool:
+    return any(step.skipped for step in branch.walk())
+
+
+def _remembered(branch: Step) -> Iterator[str]:
+    """What of a branch was decided in ticks before."""
+    for step in branch.walk():
+        if step.skipped:
+            count = len(nodes.children(step.node))
+            yield (
+                f"  goes on with step {step.skipped + 1} of {count}, where the tick before left "
+                "it: what stands before is not asked again"
+            )
 
 
 def _named(node: nodes.Node) -> str:

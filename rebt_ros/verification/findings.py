@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -14,7 +12,7 @@ from rebt_ros.verification.acting import acting_leaves
 from rebt_ros.verification.grid import Boxes, Grid
 from rebt_ros.verification.proof import grid_of, policies_of
 from rebt_ros.verification.reference import of_tree
-from rebt_ros.verification.states import Unsettled, nearest
+from rebt_ros.verification.states import possible_boxes
 from rebt_ros.verification.sweep import Results, Sweep, Ticks, Visits, remembers, sweep
 
 
@@ -80,25 +78,10 @@ def _findings(
         grid,
         tuple(_dead(tree, possible.visits)),
         tuple(_pointless(tree, possible.visits)),
-        _possible(idle, learned, channel, grid),
+        possible_boxes(idle, grid, learned.features, of_tree(learned, channel))[0],
         tuple(one for one in shown if one not in taken),
         () if table is None else _never_shown(tree, first, table),
     )
-
-
-def _possible(boxes: Boxes, learned: LearnedTree, channel: str, grid: Grid) -> Boxes:
-    """The boxes without those whose differences no numbers have."""
-    if not grid.differences:
-        return boxes
-    shown = of_tree(learned, channel)
-    kept = []
-    for place in range(boxes.shape[1]):
-        try:
-            there = nearest(boxes[:, [place]], grid, learned.features, shown) is not None
-        except Unsettled:
-            there = True
-        kept.append(there)
-    return boxes[:, np.array(kept, dtype=bool)]
 
 
 def _dead(tree: nodes.Node, visits: Sequence[Visits]) -> list[nodes.Node]:

@@ -8,9 +8,11 @@ from typing import Final
 
 import numpy as np
 
+from rebt_ros.arrays import IntArray
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, Mended
 from rebt_ros.behavior_tree.prediction import States, choose, history_columns
+from rebt_ros.demonstration.last_action import NO_ACTION
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import Literal
 from rebt_ros.verification.errors import RuleError
@@ -44,16 +46,8 @@ class Repaired:
     proofs: tuple[ChannelProof, ...]
     verdicts: tuple[Verdict, ...]
     """Of the mended tree: all rules are proven."""
-    added: int
-    """How many nodes it has more."""
-    changed: int
-    """In how many rows that were shown it does something else."""
-    rows: int
-    """How many rows that were shown are at hand."""
-
-    def __str__(self) -> str:
-        added = f"{self.added:+d} node{'' if abs(self.added) == 1 else 's'}"
-        return f"{added}, {self.changed} of {self.rows} rows changed" if self.rows else added
+    change: Mended
+    """What guards have changed; `learned` carries the same."""
 
 
 def repair(
@@ -84,30 +78,49 @@ def repair(
         found = verdicts(proofs, demands)
         failed = [one.demand for one in found if one.answer is not Answer.PROVEN]
         if not failed:
-            return Repaired(
-                mended,
-                proofs,
-                found,
-                nodes.size(mended.tree) - nodes.size(learned.tree),
-                sum(_changed(learned, mended, table) for table in tables),
-                sum(map(len, tables)),
-            )
+            change = _change(learned, mended, tables)
+            provenance = replace(mended.provenance, mended=change)
+            return Repaired(replace(mended, provenance=provenance), proofs, found, change)
         for demand in failed:
             mended = _guarded(mended, demand, results, demands, tables)
     raise RuleError(f"the tree cannot be mended by guards: {what_breaks(mended, proofs, found)}.")
 
 
-def _changed(before: LearnedTree, after: LearnedTree, table: DemonstrationTable) -> int:
-    chosen = []
+def _change(
+    before: LearnedTree, after: LearnedTree, tables: Sequence[DemonstrationTable]
+) -> Mended:
+    """What is different, also in the rows that are at hand."""
+    rows = sum(map(len, tables))
+    chosen = [[_choices(learned, table) for table in tables] for learned in (before, after)]
+    changed = sum(int(np.count_nonzero(old != new)) for old, new in zip(*chosen, strict=True))
+    agreement: list[float] = []
+    recall: list[float] = []
+    for its in chosen:
+        right = [table.chosen == one for table, one in zip(tables, its, strict=True)]
+        agreement.append(sum(int(one.sum()) for one in right) / max(rows, 1))
+        recalls = [
+            float(one[table.chosen == code].mean())
+            for table, one in zip(tables, right, strict=True)
+            for code in np.unique(table.chosen).tolist()
+        ]
+        recall.append(sum(recalls) / max(len(recalls), 1))
+    return Mended(
+        nodes.size(after.tree) - nodes.size(before.tree),
+        rows,
+        changed,
+        (agreement[0], agreement[1]) if rows else None,
+        (recall[0], recall[1]) if rows else None,
+    )
+
+
+def _choices(learned: LearnedTree, table: DemonstrationTable) -> IntArray:
+    """What a tree does in each row after what was shown before, in codes of the table's actions."""
+    policy = policies_of(learned).get(table.channel)
+    if policy is None:
+        return np.full(len(table), NO_ACTION)
     columns = history_columns(table.actions, table.previous, table.last)
-    states = States(table.features, table.states, columns)
     actions = tuple(nodes.Action(label, table.channel) for label in table.actions)
-    for learned in (before, after):
-        policy = policies_of(learned).get(table.channel)
-        if policy is None:
-            return 0
-        chosen.append(choose(policy, actions, states))
-    return int(np.count_nonzero(chosen[0] != chosen[1]))
+    return choose(policy, actions, States(table.features, table.states, columns))
 
 
 def _guarded(

@@ -60,12 +60,11 @@ def demands(rules: RuleSet, learned: LearnedTree) -> tuple[Demand, ...]:
     Raises:
         RuleError: A rule names a feature, category or action that the tree does not know.
     """
-    return tuple(_Resolver(rules.source, rule, learned).demand() for rule in rules.rules)
+    return tuple(_Resolver(rule, learned).demand() for rule in rules.rules)
 
 
 @dataclass(frozen=True, slots=True)
 class _Resolver:
-    source: str
     rule: Rule
     learned: LearnedTree
 
@@ -217,10 +216,10 @@ class _Resolver:
         return word.text
 
     def _refuse(self, why: str, at: int) -> NoReturn:
-        raise RuleError(f"{self.source}, {self.rule.place_at(at)}: {why}.")
+        raise RuleError(f"{self.rule.place_at(at)}: {why}.")
 
     def _refuse_rule(self, why: str) -> NoReturn:
-        raise RuleError(f"{self.source}, {self.rule.place}: {why}.")
+        raise RuleError(f"{self.rule.place}: {why}.")
 
 
 def _known(quantity: Quantity) -> Formula:

@@ -23,13 +23,21 @@ class RuleKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where something is written; both from 1."""
+    """Where something is written."""
 
+    source: str
+    """Name of what it stands in, such as a file."""
     line: int
+    """From 1; 0 where only `rule` is known."""
     column: int
+    """From 1."""
+    rule: int = 0
+    """Which rule it is in, from 1."""
 
     def __str__(self) -> str:
-        return f"line {self.line}, column {self.column}"
+        if not self.line:
+            return f"{self.source}, rule {self.rule}"
+        return f"{self.source}, line {self.line}, column {self.column}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +69,7 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class RuleSet:
-    """The rules of one file."""
+    """The rules of a file, or of several."""
 
     source: str
     """Name of the file, for messages."""

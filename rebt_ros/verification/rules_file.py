@@ -75,8 +75,8 @@ class _Reader:
             root: yaml.Node | None = yaml.compose(self._text, Loader=yaml.SafeLoader)
         except yaml.MarkedYAMLError as err:
             mark = err.problem_mark or err.context_mark
-            where = f", {_place(mark)}" if mark else ""
-            raise RuleError(f"{self._source}{where}: this is not YAML ({err.problem}).") from err
+            where = self._place(mark) if mark else self._source
+            raise RuleError(f"{where}: this is not YAML ({err.problem}).") from err
         except yaml.YAMLError as err:
             why = " ".join(str(err).split())
             raise RuleError(f"{self._source} is not YAML ({why}).") from err
@@ -106,7 +106,7 @@ class _Reader:
         action = self._name(fields[kind.value], "an action")
         channel = self._name(fields["channel"], "a channel") if "channel" in fields else None
         text = f"{kind.value} {action}" + (f" @{channel}" if channel else "")
-        place = _place(fields[kind.value].start_mark)
+        place = self._place(fields[kind.value].start_mark)
         if "when" not in fields:
             if kind is RuleKind.ONLY:
                 self._refuse(node, "an 'only' needs a 'when'")
@@ -114,12 +114,12 @@ class _Reader:
         condition = fields["when"]
         if not isinstance(condition, yaml.ScalarNode) or not condition.value.strip():
             self._refuse(condition, "'when' must be a condition, such as front < 0.3")
-        places = tuple(_places(self._text, condition))
+        places = tuple(self._places(condition))
         try:
             when = parse(condition.value)
         except ConditionSyntaxError as err:
             at = places[min(err.at, len(places) - 1)]
-            raise RuleError(f"{self._source}, {at}: {err.why}.") from err
+            raise RuleError(f"{at}: {err.why}.") from err
         words = " ".join(condition.value.split())
         return Rule(kind, action, channel, when, f"{text} when {words}", place, places)
 
@@ -129,32 +129,30 @@ class _Reader:
         return str(node.value)
 
     def _refuse(self, node: yaml.Node, why: str) -> NoReturn:
-        raise RuleError(f"{self._source}, {_place(node.start_mark)}: {why}.")
+        raise RuleError(f"{self._place(node.start_mark)}: {why}.")
 
+    def _place(self, mark: yaml.Mark) -> Place:
+        return Place(self._source, mark.line + 1, mark.column + 1)
 
-def _place(mark: yaml.Mark) -> Place:
-    return Place(mark.line + 1, mark.column + 1)
+    def _places(self, node: yaml.ScalarNode) -> Iterator[Place]:
+        """Where each character of a scalar stands, and its end.
 
+        YAML folds lines and leaves out quotes; what is left stands in the same order in the file.
+        """
+        line, column = node.start_mark.line, node.start_mark.column
+        source = self._text[node.start_mark.index : node.end_mark.index]
+        at = 0
 
-def _places(text: str, node: yaml.ScalarNode) -> Iterator[Place]:
-    """Where each character of a scalar stands, and its end.
+        def step() -> None:
+            nonlocal line, column, at
+            line, column = (line + 1, 0) if source[at] == "\n" else (line, column + 1)
+            at += 1
 
-    YAML folds lines and leaves out quotes; what is left stands in the same order in the file.
-    """
-    line, column = node.start_mark.line, node.start_mark.column
-    source = text[node.start_mark.index : node.end_mark.index]
-    at = 0
-
-    def step() -> None:
-        nonlocal line, column, at
-        line, column = (line + 1, 0) if source[at] == "\n" else (line, column + 1)
-        at += 1
-
-    for character in node.value:
-        if not character.isspace():
-            while at < len(source) and source[at] != character:
+        for character in node.value:
+            if not character.isspace():
+                while at < len(source) and source[at] != character:
+                    step()
+            yield Place(self._source, line + 1, column + 1)
+            if at < len(source):
                 step()
-        yield Place(line + 1, column + 1)
-        if at < len(source):
-            step()
-    yield Place(line + 1, column + 1)
+        yield Place(self._source, line + 1, column + 1)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.verification.contradictions import agreeing_demands
-from rebt_ros.verification.errors import RuleError
-from rebt_ros.verification.proof import check, verdicts
+from rebt_ros.verification.errors import BrokenRuleError
+from rebt_ros.verification.proof import Verdict, check, verdicts
 from rebt_ros.verification.repairing import repair
 from rebt_ros.verification.rules import RuleSet
 from rebt_ros.verification.sweep import Results
@@ -21,8 +21,13 @@ class Ruled:
     """A tree that is proven to keep its rules."""
 
     learned: LearnedTree
-    mended: str = ""
-    """What guards have changed, in words; empty where none were needed."""
+    verdicts: tuple[Verdict, ...]
+    """Of its rules, which are all proven."""
+
+    @property
+    def rules(self) -> tuple[str, ...]:
+        """Its rules, each in a line."""
+        return tuple(str(verdict.demand.rule) for verdict in self.verdicts)
 
 
 def ruled(
@@ -43,14 +48,16 @@ def ruled(
         mend: Whether to put guards into a tree that breaks a rule.
 
     Raises:
-        RuleError: It does not keep a rule, or the rules do not fit it.
+        BrokenRuleError: It is not proven to keep a rule.
+        RuleError: The rules do not fit it, or guards are not enough.
     """
     asked = agreeing_demands(rules, learned)
     proofs = check(learned, asked, tables, results)
-    broken = what_breaks(learned, proofs, verdicts(proofs, asked))
+    found = verdicts(proofs, asked)
+    broken = what_breaks(learned, proofs, found)
     if not broken:
-        return Ruled(learned)
+        return Ruled(learned, found)
     if not mend:
-        raise RuleError(f"{broken} ({rules.source}).")
+        raise BrokenRuleError(f"{broken} ({rules.source}).")
     mended = repair(learned, asked, tables, results)
-    return Ruled(mended.learned, str(mended))
+    return Ruled(mended.learned, mended.verdicts)

@@ -19,6 +19,8 @@ from rebt_ros.verification.reference import Reference
 
 #: Most combinations of ranges of features and differences that are tried in a box.
 _MOST_COMBINATIONS: Final = 2_000
+#: Most boxes of which it is tried to find a state.
+_MOST_TRIED: Final = 2_000
 #: How far inside of a range a value is chosen, as a share of all that was shown.
 _INSIDE: Final = 0.01
 #: Boxes times rows that are compared at a time.
@@ -85,6 +87,27 @@ def nearest(
         Unsettled: Some boxes could not be settled, and no other one has a state.
     """
     return StateFinder(grid, features, shown, movable).nearest(boxes)
+
+
+def possible_boxes(
+    boxes: Boxes, grid: Grid, features: Sequence[Feature], shown: Reference
+) -> tuple[Boxes, bool]:
+    """The boxes without those whose differences no numbers have.
+
+    Returns:
+        The boxes, and whether it is known of all of them that there are such states.
+    """
+    if not grid.differences or not boxes.shape[1]:
+        return boxes, True
+    finder = StateFinder(grid, features, shown)
+    kept = np.ones(boxes.shape[1], dtype=bool)
+    settled = boxes.shape[1] <= _MOST_TRIED
+    for place in range(min(boxes.shape[1], _MOST_TRIED)):
+        try:
+            kept[place] = finder.point(boxes[:, place], None) is not None
+        except Unsettled:
+            settled = False
+    return boxes[:, kept], settled
 
 
 class StateFinder:

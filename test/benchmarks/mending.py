@@ -69,8 +69,8 @@ def _compare(count: int, number: int, starts: range) -> None:
         mended = repaired(checked)
         before, after = drives(learned, starts), drives(mended.learned, starts)
         print(
-            f"{line}  {before[0]:>7}  {before[1]:>4}  {mended.added:>+13}  "
-            f"{mended.changed:>4}  {after[0]:>7}  {after[1]:>4}",
+            f"{line}  {before[0]:>7}  {before[1]:>4}  {mended.change.added:>+13}  "
+            f"{mended.change.changed:>4}  {after[0]:>7}  {after[1]:>4}",
             flush=True,
         )
 

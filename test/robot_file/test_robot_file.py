@@ -65,7 +65,7 @@ WRONG = [
     ),
     (
         f"{STATE}states: 1",
-        "line 2: states is unknown here; known are topics, state, actions, commands",
+        "line 2: states is unknown here; known are topics, state, actions, commands, rules",
     ),
     ("state:\n  x: /a.b\n  x: /a.c", "line 3: the key 'x' is there twice"),
     ("state: &a {x: /a.b}", "line 1: anchors (&) and aliases (*) are not read: write it out"),
@@ -100,6 +100,12 @@ WRONG = [
     (f"{STATE}actions: {{a: {{twist: /a, linear: 0}}}}", "linear must be a number from"),
     (f"{STATE}actions: {{a: {{path: /a.b, emit: always}}}}", "must be one of message, change"),
     (f"{STATE}actions: {{a: {{behavior_tree_log: /log}}}}", "needs 'labels', the nodes that are"),
+    (f"{STATE}rules: {{never: go}}", "line 2: rules must be a list, not {'never': 'go'}"),
+    (f"{STATE}rules: [{{when: x < 1}}]", "rules.0 needs exactly one of never, always, only"),
+    (f"{STATE}rules: [{{never: go, only: go}}]", "rules.0 needs exactly one of never, always"),
+    (f"{STATE}rules: [{{only: go}}]", "line 2: rules.0 needs a 'when', as it is an 'only'"),
+    (f"{STATE}rules:\n- never: go\n  if: x < 1", "line 4: rules.0.if is unknown here"),
+    (f"{STATE}rules: [{{never: go, when: ''}}]", "rules.0.when must be a text, not ''"),
 ]
 
 
@@ -150,6 +156,12 @@ commands:
   grasp: {call: /grasp, type: std_srvs/srv/Trigger}
   dock: {action: /dock, type: nav2_msgs/action/DockRobot, goal: {dock_id: home}}
   stop: {publish: /cmd_vel, type: geometry_msgs/msg/Twist, message: null}
+rules:
+  - {never: go, when: near < 0.3}
+  - always: stop
+    when: x is missing
+    channel: base
+  - {only: 2, when: mode = auto}
 """
 
 

@@ -49,7 +49,7 @@ def said(text: str) -> str:
 
 def take(text: str) -> None:
     asked = demands(rules_file.loads(text, "rules.yaml"), LEARNED)
-    refuse_contradictions("rules.yaml", asked, LEARNED)
+    refuse_contradictions(asked, LEARNED)
 
 
 def about(condition: str) -> str:
@@ -253,7 +253,7 @@ def test_the_schema_refuses_what_is_refused(text: str) -> None:
         (
             "- always: go\n  when: distance > 0.1\n- never: go\n  when: distance < 0.5\n",
             "line 4, column 10: 'never go when distance < 0.5' contradicts "
-            "'always go when distance > 0.1' of line 2, column 11, as where distance = ",
+            "'always go when distance > 0.1' of rules.yaml, line 2, column 11, as where ",
         ),
         (
             "- always: go\n  when: docked\n- always: turn\n  when: kind = cup\n",

@@ -27,7 +27,7 @@ from rebt_ros.demonstration.fields import values_of
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError, RebtError
 from rebt_ros.live.background import Background
-from rebt_ros.live.last_tick import LastTick, last_tick
+from rebt_ros.live.last_tick import LastTick
 from rebt_ros.live.novelty_guard import NoveltyGuard
 from rebt_ros.live.takeover import Takeover, channel_of
 from rebt_ros.live.tree_inputs import Message
@@ -447,8 +447,8 @@ class ExecutorNode(Node):
         self._moving = True
         self._channels.begin_tick()
         state = program.inputs.state()
-        self._last_tick = last_tick(program.learned, state, program.runtime.histories)
         commands = program.runtime.tick(state).commands
+        self._last_tick = LastTick(program.learned, tuple(state), program.runtime.outcomes())
         self._ticks += 1
         self._commands += self._channels.send(commands)
         self._slowest = max(self._slowest, time.perf_counter() - began)

@@ -19,7 +19,7 @@ from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError
 from rebt_ros.live.keeping_rules import kept
 from rebt_ros.live.tree_inputs import TreeInputs
-from rebt_ros.offline.rules_files import read_rules
+from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.ros.command_channels import topic_of
 from rebt_ros.ros.executor.settings import ExecutorSettings
 from rebt_ros.verification.errors import RuleError
@@ -69,7 +69,7 @@ class Preparation:
         self._commander = commander
         self._histories = histories
         self._retired: deque[TreeProgram] = deque()
-        self._rules = read_rules(settings.rules_file) if settings.rules_file else None
+        self._rules = rules_for(settings.rules_file, settings.robot)
 
     def retire(self, program: TreeProgram) -> None:
         """Has the next call of `read` take a program apart that is not needed any more."""

@@ -29,7 +29,7 @@ from rebt_ros.live.learning_process import (
     Lesson,
     Progress,
 )
-from rebt_ros.offline.rules_files import read_rules
+from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
 from rebt_ros.ros.graph_watch import GraphWatch
@@ -219,8 +219,8 @@ class LearnerNode(Node):
             RebtError: It is not proven to keep the rules, or these cannot be read.
         """
         rules = self._settings.rules
-        path = rules.file()
-        kept(learned, read_rules(path) if path else None, action_results=rules.action_results())
+        wanted = rules_for(rules.file(), learned.robot)
+        kept(learned, wanted, action_results=rules.action_results())
         return learned
 
     def _versions(self) -> TreeVersions:
