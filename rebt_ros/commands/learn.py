@@ -37,8 +37,8 @@ from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
 from rebt_ros.learning.pipeline import summary_sentence
 from rebt_ros.learning.report import FORECAST, LearningReport
 from rebt_ros.offline import learning_from_files
+from rebt_ros.offline.exports import write_export
 from rebt_ros.offline.result import OfflineLearning
-from rebt_ros.storage.atomic import write_text_atomically
 
 _REDUCTIONS = {
     "domain": "do not use that thresholds, categories and last actions exclude each other",
@@ -433,15 +433,8 @@ def _learn(parsed: argparse.Namespace) -> None:
     files = "tree.json, summary.json and pictures of the tree and of its decision tree"
     print(f"Written to {parsed.out}: {files}{', levels/' if parsed.levels else ''}.")
     if parsed.export is not None:
-        _export(result.learned, parsed.export, parsed.out)
-
-
-def _export(learned: LearnedTree, language: str, directory: Path) -> None:
-    """Writes the tree for another engine, or else leaves none there that is of another tree."""
-    path = directory / f"{language}.xml"
-    path.unlink(missing_ok=True)
-    write_text_atomically(path, LANGUAGES[language](learned))
-    print(f"Exported to {path}.")
+        exported = write_export(parsed.out, result.learned, parsed.export)
+        print(f"Exported to {exported}.")
 
 
 def _declared(parsed: argparse.Namespace) -> dict[str, FeatureKind]:

@@ -11,6 +11,7 @@ from rebt_ros.drawing.text import render_text
 from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.learning_file import load_learning, write_learning
 from rebt_ros.learning.options import PsaChoice
+from rebt_ros.offline.exports import write_exports_again
 from rebt_ros.offline.level_files import write_behavior_tree, write_decision_tree
 from rebt_ros.storage.atomic import write_text_atomically
 
@@ -86,6 +87,7 @@ def _write(directory: Path, learning: Learning) -> tuple[str, ...]:
     write_text_atomically(directory / "tree.txt", render_text(learning.learned))
     notes += write_decision_tree(directory, learning.decision_tree.tree)
     notes += write_learning(directory, learning)
+    notes += write_exports_again(directory, learning.learned)
     return tuple(dict.fromkeys(notes))
 
 

@@ -166,7 +166,14 @@ class _Parser:
 
     def expect_end(self) -> None:
         """Refuses what comes after a condition."""
-        if self._next.kind is not _Kind.END:
+        token = self._next
+        if token.kind is _Kind.WORD and self._tokens[self._place - 1].kind is _Kind.NUMBER:
+            raise ConditionSyntaxError(
+                f"numbers stand without units, in those of the feature: 'and', 'or' or the end is "
+                f"expected, not {token}",
+                token.at,
+            )
+        if token.kind is not _Kind.END:
             raise self._refuse("'and', 'or' or the end")
 
     def any_of(self, deepest: int) -> Expression:

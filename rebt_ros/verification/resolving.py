@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Final, NoReturn
 
 from rebt_ros.behavior_tree import nodes
@@ -77,8 +78,10 @@ class _Resolver:
         label, channel = self.rule.action, self.rule.channel
         found = [action for action in self.learned.actions if action.label == label]
         if not found:
-            labels = dict.fromkeys(action.label for action in self.learned.actions)
-            self._refuse_rule(f"there is no action {label!r}: there are {_listed([*labels])}")
+            labels = [*dict.fromkeys(action.label for action in self.learned.actions)]
+            self._refuse_rule(
+                f"there is no action {_unknown(label, labels)}: there are {_listed(labels)}"
+            )
         on_channel = [one for one in found if channel in (None, one.channel)]
         if not on_channel:
             self._refuse_rule(f"the action {label!r} is not on a channel {channel!r}")
@@ -169,7 +172,9 @@ class _Resolver:
         if wanted not in feature.categories:
             listed = _listed(feature.categories)
             self._refuse(
-                f"{feature.name!r} has no category {right.text!r}: it has {listed}", right.at
+                f"{feature.name!r} has no category {_unknown(right.text, feature.categories)}: "
+                f"it has {listed}",
+                right.at,
             )
         if sign is Sign.EQUAL:
             return _among(feature, (wanted,))
@@ -206,13 +211,15 @@ class _Resolver:
         for feature in self.learned.features:
             if feature.name == word.text:
                 return feature
-        names = _listed([one.name for one in self.learned.features])
-        self._refuse(f"there is no feature {word.text!r}: there are {names}", word.at)
+        names = [one.name for one in self.learned.features]
+        unknown = _unknown(word.text, names)
+        self._refuse(f"there is no feature {unknown}: there are {_listed(names)}", word.at)
 
     def _label(self, word: Word) -> str:
         labels = tuple(dict.fromkeys(action.label for action in self.learned.actions))
         if word.text not in labels:
-            self._refuse(f"there is no action {word.text!r}: there are {_listed(labels)}", word.at)
+            unknown = _unknown(word.text, labels)
+            self._refuse(f"there is no action {unknown}: there are {_listed(labels)}", word.at)
         return word.text
 
     def _refuse(self, why: str, at: int) -> NoReturn:
@@ -257,6 +264,12 @@ def _at_most(quantity: Quantity, value: float) -> Formula:
 def _before(value: float) -> float:
     """The next smaller number in double precision."""
     return math.nextafter(value, -math.inf)
+
+
+def _unknown(name: str, known: Sequence[str]) -> str:
+    """A name that is not known, with the one that may be meant."""
+    close = get_close_matches(name, known, n=1)
+    return f"{name!r} ({close[0]!r} is like it)" if close else repr(name)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -23,7 +23,8 @@ from rebt_ros.commands.revise import main as revise_command
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import tabulate
-from rebt_ros.errors import InputError, OptionError
+from rebt_ros.errors import InputError, OptionError, RebtError
+from rebt_ros.export.btcpp import to_btcpp
 from rebt_ros.learning import evaluation
 from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.learning_file import Saved, load_learning, restored, saved, write_learning
@@ -304,3 +305,25 @@ def test_revise_lists_what_can_be_changed_and_changes_it(
     with pytest.raises(SystemExit):
         revise(capsys, tmp_path, "--level", "999")
     assert capsys.readouterr().err.startswith("revise: there is no pruning level 999")
+
+
+def test_revise_exports_again_what_was_exported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = learned()
+    write_learning(tmp_path, mine)
+    exported = tmp_path / "btcpp.xml"
+    revise(capsys, tmp_path, "--attach", mine.learned.suggestions[0].id)
+    assert not exported.exists()
+    for suggestion in mine.learned.suggestions:
+        exported.write_text("of a tree before")
+        out = revise(capsys, tmp_path, "--detach", "all", "--attach", suggestion.id)
+        revised = loads((tmp_path / "tree.json").read_text())
+        expected, refusal = "", ""
+        try:
+            expected = to_btcpp(revised)
+        except RebtError as err:
+            refusal = str(err)
+        assert exported.exists() is bool(expected)
+        assert not exported.exists() or exported.read_text() == expected
+        assert f"btcpp.xml is gone: {refusal}" in out or not refusal

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 
 import numpy as np
 import rule_examples as written
@@ -38,6 +39,13 @@ def _compares(tree: nodes.Node) -> bool:
     )
 
 
+def _on_channel(node: nodes.Node, channel: str) -> nodes.Node:
+    if isinstance(node, nodes.Action):
+        return nodes.Action(node.label, channel)
+    family = tuple(_on_channel(child, channel) for child in nodes.children(node))
+    return nodes.with_children(node, family)
+
+
 def _single(point: object) -> written.Everything:
     before = point.before
     history = ActionHistory() if before is None else before.history()
@@ -45,18 +53,29 @@ def _single(point: object) -> written.Everything:
 
 
 @settings(max_examples=40 * MORE, deadline=None, suppress_health_check=list(HealthCheck))
-@given(some.trees(), st.lists(written.rules(), min_size=RULES_PER_TREE, max_size=RULES_PER_TREE))
+@given(
+    some.trees(),
+    st.none() | some.trees(),
+    st.lists(written.rules(), min_size=RULES_PER_TREE, max_size=RULES_PER_TREE),
+)
 def test_answers_are_those_of_brute_force_over_all_cells(
-    tree: nodes.Node, rules: list[written.WrittenRule]
+    tree: nodes.Node, beside: nodes.Node | None, rules: list[written.WrittenRule]
 ) -> None:
     learned = some.learned(tree)
+    channel = ""
+    if beside is not None and nodes.actions(tree) and nodes.actions(beside):
+        # Another channel has actions of the same names.
+        arm = _on_channel(beside, "arm")
+        actions = tuple(nodes.Action(label, "arm") for label in some.LABELS)
+        learned = replace(learned, tree=nodes.Parallel((tree, arm)), actions=some.ACTIONS + actions)
+        channel = f"    channel: {some.CHANNEL}\n"
     executed = executable(tree)
     history = written.looks_back(tree) or any(rule.when.looks_back for rule in rules)
     differs = _compares(tree) or any(rule.when.differs for rule in rules)
     states = written.everything(history, differs)
     done = written.commands(executed, states)
     for rule in rules:
-        asked = demands(loads(rule.text), learned)
+        asked = demands(loads(f"{rule.text}{channel}"), learned)
         verdict = verdicts(check(learned, asked), asked)[0]
         broken = rule.broken(states, done)
         if verdict.answer is Answer.PROVEN:

@@ -131,7 +131,12 @@ def test_whatever_is_written_is_a_condition_or_is_refused_at_a_place(text: str) 
     ("condition", "place", "why"),
     [
         ("distance <", 19, "a feature or a number is expected, not the end"),
-        ("distance < 0.3 battery", 24, "'and', 'or' or the end is expected, not 'battery'"),
+        ("distance < 0.3 battery", 24, "numbers stand without units, in those of the feature: 'a"),
+        ("docked battery", 16, "'and', 'or' or the end is expected, not 'battery'"),
+        ("distance < 0.3 m", 24, "numbers stand without units, in those of the feature: 'and', "),
+        ("distence < 0.3", 9, "there is no feature 'distence' ('distance' is like it): there are"),
+        ("kind = cups", 16, "'kind' has no category 'cups' ('cup' is like it): it has box, cup"),
+        ("doing trun", 15, "there is no action 'trun' ('turn' is like it): there are go, grasp"),
         ("(docked", 16, "')' is expected, not the end"),
         ("0 < distance < 1 < battery", 26, "'and', 'or' or the end is expected"),
         ("0.3 < distance > 0.1", 24, "two comparisons in a row must go the same way"),
