@@ -6,9 +6,10 @@ name, which `recordings` passes over, and the files of what was deleted go after
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -22,6 +23,7 @@ from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.storage.atomic import StorageError
 from rebt_ros.storage.recording import ASIDE, SUFFIX, is_recording, read_recording
 from rebt_ros.storage.recording_head import Origin, read_head
+from rebt_ros.storage.recording_parts import write_part
 from rebt_ros.studio.tree_view import Json
 
 #: Follows the name of a recording that is kept, but not learned from.
@@ -31,6 +33,8 @@ DELETED: Final = ".deleted"
 
 #: How long a deleted demonstration can be had back (seconds).
 UNDO_TIME: Final = 600.0
+
+_BACK: Final = f"for {UNDO_TIME / 60:.0f} minutes the whole one can be had back."
 
 #: Points of a thumbnail's line, and features that have one.
 _POINTS: Final = 60
@@ -105,6 +109,33 @@ class Shelf:
         self._rename(name, DELETED, "")
         return f"{name} is back."
 
+    def trim(self, name: str, first: float, end: float) -> str:
+        """Keeps a stretch of a demonstration, as one of its own; the whole one is deleted.
+
+        Args:
+            name: Of the demonstration.
+            first: Seconds since its first row.
+            end: The same; rows up to it are kept.
+
+        Raises:
+            RebtError: There is none of this name, the stretch has no rows, or it cannot be written.
+        """
+        self._cut(name, ((first, math.nextafter(end, math.inf)),))
+        return f"{name} is cut to {first:.1f} to {end:.1f} s; {_BACK}"
+
+    def split(self, name: str, at: float) -> str:
+        """Makes two demonstrations of one, which is deleted.
+
+        Args:
+            name: Of the demonstration.
+            at: Seconds since its first row, where the second one begins.
+
+        Raises:
+            RebtError: There is none of this name, a part has no rows, or it cannot be written.
+        """
+        self._cut(name, ((-math.inf, at), (at, math.inf)))
+        return f"{name} is split at {at:.1f} s; {_BACK}"
+
     def tidy(self) -> None:
         """Destroys what was deleted too long ago to be had back.
 
@@ -130,11 +161,27 @@ class Shelf:
                 if path.name.endswith(SUFFIX + suffix) and is_recording(path):
                     yield path, suffix
 
-    def _rename(self, name: str, before: str, after: str) -> None:
-        path = self.directory / f"{name}{SUFFIX}{before}"
-        # A name comes from a browser, and must not lead out of the directory.
+    def _cut(self, name: str, stretches: Sequence[tuple[float, float]]) -> None:
+        path = self._path(name, "")
+        written: list[Path] = []
+        try:
+            for number, (first, end) in enumerate(stretches, start=1):
+                written.append(write_part(path, first, end, f"{name}-{number}"))
+        except RebtError:
+            for part in written:
+                part.unlink(missing_ok=True)
+            raise
+        self._rename(name, "", DELETED)
+
+    def _path(self, name: str, suffix: str) -> Path:
+        """The file of a demonstration: a name comes from a browser, and may not lead elsewhere."""
+        path = self.directory / f"{name}{SUFFIX}{suffix}"
         if path.parent != self.directory or path not in dict(self._files()):
             raise OptionError(f"there is no demonstration {name!r} any more, or it has changed.")
+        return path
+
+    def _rename(self, name: str, before: str, after: str) -> None:
+        path = self._path(name, before)
         to = path.with_name(f"{name}{SUFFIX}{after}")
         if to.exists():
             raise OptionError(f"there is a file {to.name} already: move it elsewhere.")

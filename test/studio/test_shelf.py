@@ -87,6 +87,42 @@ def test_no_name_leads_out_of_the_directory(tmp_path: Path, name: str) -> None:
     assert (tmp_path / "outside.rec").is_file()
 
 
+def actions_in(directory: Path) -> dict[str, str]:
+    """What was done in each demonstration."""
+    found = {}
+    for path in recordings(directory):
+        shown = read_recording(path).demonstration
+        found[path.stem] = "".join(shown.actions[code] for code in shown.chosen)
+    return found
+
+
+def test_a_demonstration_is_cut_to_a_stretch_and_can_be_had_back(tmp_path: Path) -> None:
+    record(tmp_path, "abcde", "first")
+    shelf = Shelf(tmp_path)
+    shelf.trim("first", 1.0, 3.0)
+    assert actions_in(tmp_path) == {"first-1": "bcd"}
+    part = read_recording(tmp_path / "first-1.rec").demonstration
+    assert part.states[:, 0].tolist() == [1.0, 2.0, 3.0]
+    assert part.before == {"action": "a"}
+    shelf.restore("first")
+    assert actions_in(tmp_path) == {"first": "abcde", "first-1": "bcd"}
+
+
+def test_a_demonstration_is_split_in_two_between_rows(tmp_path: Path) -> None:
+    record(tmp_path, "abcde", "first")
+    Shelf(tmp_path).split("first", 2.0)
+    assert actions_in(tmp_path) == {"first-1": "ab", "first-2": "cde"}
+
+
+@pytest.mark.parametrize("at", [-1.0, 0.0, 99.0])
+def test_a_split_without_two_parts_changes_nothing(tmp_path: Path, at: float) -> None:
+    record(tmp_path, "abcde", "first")
+    with pytest.raises(OptionError, match="no rows from"):
+        Shelf(tmp_path).split("first", at)
+    assert actions_in(tmp_path) == {"first": "abcde"}
+    assert list(tmp_path.iterdir()) == [tmp_path / "first.rec"]
+
+
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     record(tmp_path, "ab", "first")
     shelf = Shelf(tmp_path)

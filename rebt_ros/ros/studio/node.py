@@ -162,6 +162,12 @@ class StudioNode(Node):
             "take_in": partial(self._on_shelf, self._shelf.take_in),
             "delete": partial(self._on_shelf, self._shelf.delete),
             "restore_demonstration": partial(self._on_shelf, self._shelf.restore),
+            "trim": lambda asked: self._on_shelf(
+                lambda name: self._shelf.trim(name, asked.number("from"), asked.number("to")), asked
+            ),
+            "split": lambda asked: self._on_shelf(
+                lambda name: self._shelf.split(name, asked.number("at")), asked
+            ),
         }
 
     def _curating(self) -> _Verbs:
