@@ -142,7 +142,11 @@ class RobotWatch:
         try:
             snapshot = json.loads(message.data)
             run = {name: snapshot[name] for name in ("condition", "status", "tip", "document")}
-            commands = {str(key): str(value) for key, value in snapshot["commands"].items()}
+            commands = {
+                str(key): str(value)
+                for key, value in snapshot["commands"].items()
+                if value is not None
+            }
             statuses = tuple(map(str, snapshot["nodes"]))
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             self._faults.note("snapshots", "a snapshot of the executor cannot be read.")

@@ -103,9 +103,11 @@ class Server:
                 web.get("/{name:.+}", self._file),
             ]
         )
-        runner = web.AppRunner(application, access_log=None, handle_signals=False)
+        runner = web.AppRunner(
+            application, access_log=None, handle_signals=False, shutdown_timeout=1.0
+        )
         await runner.setup()
-        await web.SockSite(runner, self._socket, shutdown_timeout=1.0).start()
+        await web.SockSite(runner, self._socket).start()
         telling = asyncio.create_task(self._tell())
         await self._stopped.wait()
         telling.cancel()
