@@ -4,6 +4,7 @@ import { element } from "./dom.js";
 import { count, percent } from "./words.js";
 
 let loading = null;
+let sized = null;
 
 function plotly() {
   loading ??= new Promise((resolve, reject) => {
@@ -82,7 +83,12 @@ export async function drawLevels(host, levels, current, choose) {
   // Plotly adds to what is there, also to words that say to wait.
   const isNew = !host.classList.contains("js-plotly-plot");
   if (isNew) host.replaceChildren();
-  await Plotly[isNew ? "newPlot" : "react"](host, traces, layout, { displayModeBar: false, responsive: true });
+  await Plotly[isNew ? "newPlot" : "react"](host, traces, layout, { displayModeBar: false });
+  // Plotly hears of the window's size only, not of a section that is shown again.
+  sized ??= new ResizeObserver(() => {
+    if (host.clientWidth && host.classList.contains("js-plotly-plot")) Plotly.Plots.resize(host);
+  });
+  sized.observe(host);
   host.removeAllListeners?.("plotly_click");
   host.on("plotly_click", (event) => {
     const [point] = event.points;

@@ -77,6 +77,7 @@ export class Curate {
     for (const verb of ["undo", "redo"]) {
       const words = verb === "undo" ? "Undo" : "Redo";
       setText(byId(verb), draft[verb] ? `${words}: ${draft[verb]}` : `Nothing to ${verb}`);
+      setAttribute(byId(verb), "title", draft[verb] ? `${words}: ${draft[verb]}` : null);
       byId(verb).disabled = !draft[verb];
     }
     byId("reset").disabled = !draft.undo;

@@ -5,7 +5,7 @@ import { button, element, setAttribute, setText, svg } from "./dom.js";
 import { fillOf } from "./colors.js";
 import { number } from "./words.js";
 
-const [WIDTH, HEIGHT, AXIS] = [320, 150, 20];
+const [WIDTH, HEIGHT, AXIS] = [520, 170, 20];
 
 /** The histogram of one condition, with a handle for each of its thresholds. */
 export class Histogram {
