@@ -69,6 +69,7 @@ export class Explain {
     this.name = name;
     this.seconds = 0;
     this.told = null;
+    this.drawn = null;
     this.picture();
     this.render(new Set());
     if (!this.isRobot && this.state.get("demonstrations")[name]) this.at(0);
@@ -87,7 +88,10 @@ export class Explain {
         ? "Press a point of the strip: you see what the robot's tree did then, and why."
         : "Press a point of the picture: you see what your draft does then, and why.",
     );
-    if (this.isRobot || !shown) return;
+    // What is pointed at stays, unless it is another picture: a recording goes on elsewhere, say.
+    const names = this.state.get("names");
+    if (this.isRobot || !shown || (shown === this.drawn && names === this.names)) return;
+    [this.drawn, this.names] = [shown, names];
     const drawn = thumbnail(shown, (one) => this.state.shown(one), { large: true });
     this.cursor = element("span", { class: "cursor" });
     byId("explain-picture").replaceChildren(element("div", { class: "cut" }, drawn.firstElementChild, this.cursor), drawn);
