@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 import pytest
 from ros_processes import NodeProcess, Peer, own_domain
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 from studio_client import StudioClient, url_of
 
 from rebt_ros.studio.access import COOKIE, HEADERS
@@ -292,6 +293,19 @@ def test_a_person_teaches_learns_edits_publishes_and_the_robot_does_it(
         first = min(client.board["versions"])
         client.does("restore", version=first)
         client.wait(lambda: client.board["tree"]["document"] == before)
+
+
+def test_it_ends_in_order_while_a_service_keeps_it_waiting(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    # It is never spun, so that it never answers.
+    peer.node.create_service(Trigger, "learner/relearn", lambda _, response: response)
+    with NodeProcess("studio", domain, tmp_path, PORT) as studio:
+        with StudioClient(url_of(studio)) as client:
+            client.begin("learn")
+            client.does("ping")
+        assert studio.stop() == 0
+        assert "Traceback" not in studio.stderr
 
 
 def test_two_browsers_see_the_same_and_heal_when_nodes_come_back(

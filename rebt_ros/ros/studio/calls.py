@@ -17,6 +17,8 @@ PATIENCE: Final = 10.0
 #: For a service that was not seen yet (seconds).
 _FINDING: Final = 2.0
 
+_ENDING: Final = "the studio is ending."
+
 
 class CallError(RebtError):
     """A node did not do what it was asked."""
@@ -32,7 +34,8 @@ class Calls:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._clients: dict[str, Client] = {}
-        self._lock = threading.Lock()
+        self._changed = threading.Condition()
+        self._ended = False
 
     def prepare(self, switches: list[str], triggers: list[str]) -> None:
         """Makes the clients, so that services are known by the time they are called."""
@@ -40,6 +43,12 @@ class Calls:
             self._clients[name] = self._node.create_client(SetBool, name)
         for name in triggers:
             self._clients[name] = self._node.create_client(Trigger, name)
+
+    def close(self) -> None:
+        """Ends all waiting."""
+        with self._changed:
+            self._ended = True
+            self._changed.notify_all()
 
     def switch(self, service: str, on: bool) -> str:
         """Calls a service that switches something.
@@ -66,16 +75,21 @@ class Calls:
         if not client.wait_for_service(_FINDING):
             node = service.rpartition("/")[0]
             raise CallError(f"there is no {node} that answers: start it, or check its name.")
-        done = threading.Event()
-        with self._lock:
+        with self._changed:
+            if self._ended:
+                raise CallError(_ENDING)
             future: Future = client.call_async(request)
-        future.add_done_callback(lambda _: done.set())
-        if not done.wait(patience):
-            client.remove_pending_request(future)
-            raise CallError(f"{service} did not answer within {patience:.0f} s: look at its log.")
-        answer = future.result()
+            future.add_done_callback(self._note)
+            self._changed.wait_for(lambda: future.done() or self._ended, patience)
+        answer = future.result() if future.done() else None
         if answer is None:
-            raise CallError(f"{service} did not answer: look at its log.")
+            client.remove_pending_request(future)
+            late = f"{service} did not answer within {patience or 0:.0f} s: look at its log."
+            raise CallError(_ENDING if self._ended else late)
         if not answer.success:
             raise CallError(answer.message or f"{service} refused.")
         return str(answer.message) or "done."
+
+    def _note(self, _: Future) -> None:
+        with self._changed:
+            self._changed.notify_all()

@@ -88,6 +88,8 @@ class StudioNode(Node):
     def close(self) -> None:
         """Ends the server."""
         self._ended.set()
+        self._calls.close()
+        self._proposals.close()
         self._server.close()
 
     # --- threads ---

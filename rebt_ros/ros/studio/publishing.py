@@ -33,6 +33,7 @@ class Proposals:
         self._proposals = node.create_publisher(String, f"{learner}/proposal", 1)
         self._answered = threading.Condition()
         self._answers: dict[str, dict[str, Any]] = {}
+        self._ended = False
         node.create_subscription(String, f"{learner}/proposal_answer", self._on_answer, 10)
 
     def publish(self, document: str) -> tuple[str, str]:
@@ -55,7 +56,8 @@ class Proposals:
         with self._answered:
             self._answers.pop(name, None)
             self._proposals.publish(String(data=document))
-            if not self._answered.wait_for(lambda: name in self._answers, _PATIENCE):
+            self._answered.wait_for(lambda: name in self._answers or self._ended, _PATIENCE)
+            if name not in self._answers:
                 raise PublishingError(
                     f"{self._learner} did not answer within {_PATIENCE:.0f} s: look at its log."
                 )
@@ -63,6 +65,12 @@ class Proposals:
         if not answer["published"]:
             raise PublishingError(str(answer["message"]))
         return str(answer["message"]), str(answer["version"])
+
+    def close(self) -> None:
+        """Ends all waiting."""
+        with self._answered:
+            self._ended = True
+            self._answered.notify_all()
 
     def _on_answer(self, message: String) -> None:
         try:

@@ -9,6 +9,7 @@ import socket
 import threading
 import time
 from collections.abc import Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,6 +30,8 @@ _PERIOD: Final = 0.1
 _LONGEST: Final = 1 << 16
 #: Requests of one browser that are under way at a time; others wait.
 _AT_A_TIME: Final = 4
+#: Requests of all browsers that are under way at a time: learning alone takes one for minutes.
+_THREADS: Final = 16
 #: Between two signs of life (seconds); a browser that gives none is gone.
 _HEARTBEAT: Final = 20.0
 
@@ -64,6 +67,7 @@ class Server:
         self._files = _files()
         self._browsers: set[_Browser] = set()
         self._loop = asyncio.new_event_loop()
+        self._loop.set_default_executor(ThreadPoolExecutor(_THREADS, "request"))
         self._changed = asyncio.Event()
         self._stopped = asyncio.Event()
         self._thread = threading.Thread(target=self._run, daemon=True, name="web server")
