@@ -5,7 +5,7 @@ import { sentence } from "./words.js";
 
 const STAYS = 6000;
 const STAYS_LONGER = 14000;
-const MOST = 4;
+const MOST = 2;
 
 /**
  * Says a sentence.
