@@ -15,7 +15,7 @@ unset _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 venv=.venv
 stamp=$venv/.set-up
-ros_wheels=(ros-jazzy-rclpy ros-jazzy-common-interfaces ros-jazzy-rmw-fastrtps-cpp)
+ros_wheels=(ros-jazzy-rclpy ros-jazzy-common-interfaces ros-jazzy-rmw-fastrtps-cpp ros-jazzy-test-msgs)
 tools=(colcon-common-extensions mypy ruff setuptools)
 
 fail() {

@@ -49,14 +49,18 @@ ROS: Final = frozenset(
         "ament_index_python",
         "builtin_interfaces",
         "diagnostic_msgs",
+        "geometry_msgs",
         "launch",
         "launch_ros",
+        "nav_msgs",
         "rcl_interfaces",
         "rclpy",
         "ros2cli",
         "rosidl_runtime_py",
+        "sensor_msgs",
         "std_msgs",
         "std_srvs",
+        "test_msgs",
     }
 )
 ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")

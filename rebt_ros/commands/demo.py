@@ -47,6 +47,8 @@ from rebt_ros.storage.atomic import write_text_atomically
 _FRESH_STARTS = 100_000
 #: Simulated seconds per second.
 _SPEEDUP = 20.0
+#: Says where features and actions are in the robot's messages, and what labels do.
+_ROBOT_FILE = "demo_robot.yaml"
 #: Ticks of the executor per simulated second.
 _RATE = 20.0
 _START_TIMEOUT, _RUN_TIMEOUT, _LEARN_TIMEOUT, _STOP_TIMEOUT = 30.0, 60.0, 120.0, 5.0
@@ -63,6 +65,8 @@ class Plan:
     demonstrations: int
     trials: int
     out: Path
+    plain: bool
+    """Whether everybody speaks arrays and words, and not the messages of real robots."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -78,9 +82,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument(
         "--out", type=directory, default=Path("demo-results"), help="default: ./%(default)s"
     )
+    parser.add_argument(
+        "--plain",
+        action="store_true",
+        help="speak Float64MultiArray and String, instead of standard messages and a robot file",
+    )
     parsed = parse(parser, arguments)
     folder = parsed.out / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
-    plan = Plan(parsed.demonstrations, parsed.trials, folder.resolve())
+    plan = Plan(parsed.demonstrations, parsed.trials, folder.resolve(), parsed.plain)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _interrupt)
     run(lambda: _demonstrate(plan), "demo")
@@ -92,8 +101,9 @@ def _interrupt(number: int, frame: object) -> None:
 
 def _demonstrate(plan: Plan) -> None:
     started = time.monotonic()
-    # A domain of its own, on this machine only: the demo never meets a robot.
-    os.environ["ROS_DOMAIN_ID"] = str(random.SystemRandom().randrange(1, 100))
+    # A domain of its own, on this machine only: the demo never meets a robot.  Those from 215 to
+    # 232 are as good as those up to 101 (whose ports no other program gets on Linux), and rarer.
+    os.environ["ROS_DOMAIN_ID"] = str(random.SystemRandom().randrange(215, 233))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     (plan.out / "logs").mkdir(parents=True)
     with _processes(plan) as processes, _person(processes) as person:
@@ -114,12 +124,14 @@ def _demonstrate(plan: Plan) -> None:
 @contextlib.contextmanager
 def _processes(plan: Plan) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
     """The five nodes as processes, none of which outlives the block."""
+    robot_file = {} if plan.plain else {"robot_file": _shared_files() / "config" / _ROBOT_FILE}
+    shown = plan.out / "demonstrations"
     commands: dict[str, dict[str, Any]] = {
-        "robot": {"speedup": _SPEEDUP, "rate": _RATE, "lockstep": True},
-        "demonstrator": {"enabled": False},
-        "recorder": {"demonstrations": plan.out / "demonstrations", "recording": False},
-        "learner": {"demonstrations": plan.out / "demonstrations", "output": plan.out / "learned"},
-        "executor": {"rate": _RATE * _SPEEDUP},
+        "robot": {"speedup": _SPEEDUP, "rate": _RATE, "lockstep": True, "plain": plan.plain},
+        "demonstrator": {"enabled": False, "plain": plan.plain},
+        "recorder": {"demonstrations": shown, "recording": False, **robot_file},
+        "learner": {"demonstrations": shown, "output": plan.out / "learned"},
+        "executor": {"rate": _RATE * _SPEEDUP, **robot_file},
     }
     running: dict[str, subprocess.Popen[bytes]] = {}
     try:
@@ -133,16 +145,24 @@ def _processes(plan: Plan) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
         _stop(list(running.values()))
 
 
-def _command(name: str, parameters: dict[str, Any]) -> list[str]:
+def _prefix() -> Path:
+    """Where the package is installed."""
     try:
-        prefix = Path(get_package_prefix("rebt_ros"))
+        return Path(get_package_prefix("rebt_ros"))
     except PackageNotFoundError as err:
         raise DemoError(
             "the package rebt_ros is not in the environment: "
             "build it and source install/local_setup.bash first, or use 'make demo'."
         ) from err
-    command = [str(prefix / "lib" / "rebt_ros" / name), "--ros-args"]
-    command += ["--params-file", str(prefix / "share" / "rebt_ros" / "config" / f"{name}.yaml")]
+
+
+def _shared_files() -> Path:
+    return _prefix() / "share" / "rebt_ros"
+
+
+def _command(name: str, parameters: dict[str, Any]) -> list[str]:
+    command = [str(_prefix() / "lib" / "rebt_ros" / name), "--ros-args"]
+    command += ["--params-file", str(_shared_files() / "config" / f"{name}.yaml")]
     for parameter, value in parameters.items():
         text = str(value).lower() if isinstance(value, bool) else str(value)
         command += ["-p", f"{parameter}:={text}"]

@@ -159,7 +159,8 @@ class JoyLabeller:
         held = next((label for one, label in source.hold.items() if one in down), "")
         held = held or self._axis(message.axes)
         self.acts = bool(held or pressed)
-        changed = [held] if held != self._held else []
+        again = bool(held) and self._source.emit is Emit.MESSAGE
+        changed = [held] if again or held != self._held else []
         self._held = held
         # What is pressed lasts until something else is done.
         return [*changed, *pressed]

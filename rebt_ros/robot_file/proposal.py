@@ -31,6 +31,8 @@ _AROUND: Final = (
     ("back_right", -180, -108),
     ("right", -108, -36),
 )
+#: A joystick that is sent so often repeats what is held (Hz).
+_EVENLY_SENT: Final = 5.0
 #: A velocity is at rest below this share of the largest one that was seen.
 _DEAD_BAND: Final = 0.1
 
@@ -96,10 +98,17 @@ def _actions(topics: Sequence[TopicSurvey]) -> Iterator[tuple[str, list[str]]]:
         yield one.topic, [f"action: {_quoted(f'{one.topic}.data')}  # {labels}"]
     for topic in topics:
         if topic.kind == _JOY and (lines := _joy(topic)):
-            yield topic.topic, ["action:", f"  joy: {_key(topic.topic)}", *lines]
+            yield topic.topic, ["action:", f"  joy: {_key(topic.topic)}", *_every(topic), *lines]
     for topic in topics:
         if topic.kind in _TWISTS and (lines := _twist(topic)):
             yield topic.topic, ["action:", f"  twist: {_key(topic.topic)}", *lines]
+
+
+def _every(topic: TopicSurvey) -> list[str]:
+    """That each message is a row, where a joystick is sent all the time."""
+    if topic.rate < _EVENLY_SENT:
+        return []
+    return [f"  emit: message  # sent {topic.rate:.3g} times a second; `change` for few rows"]
 
 
 def _joy(topic: TopicSurvey) -> list[str]:

@@ -236,7 +236,7 @@ def _path_actions(place: Place) -> ActionSource:
 
 
 def _joy_actions(place: Place) -> ActionSource:
-    fields = place.fields("joy", "press", "hold", "axes", "hysteresis")
+    fields = place.fields("joy", "press", "hold", "axes", "hysteresis", "emit")
     press, hold = (
         {_button(its, key): label for key, (its, label) in _places(fields, name).items()}
         for name in ("press", "hold")
@@ -249,7 +249,8 @@ def _joy_actions(place: Place) -> ActionSource:
     if not (press or hold or axes):
         place.refuse("needs 'press', 'hold' or 'axes'")
     hysteresis = fields["hysteresis"].number(0, 1) if "hysteresis" in fields else 0.1
-    return JoyActions(fields["joy"].text(), press, hold, axes, hysteresis)
+    emit = _emit(fields, Emit.CHANGE)
+    return JoyActions(fields["joy"].text(), press, hold, axes, hysteresis, emit)
 
 
 def _places(fields: Mapping[str, Place], name: str) -> dict[str, tuple[Place, str]]:
@@ -387,8 +388,8 @@ def _labels(fields: Mapping[str, Place], name: str) -> dict[str, str]:
     return {key: label for key, (_, label) in _places(fields, name).items()}
 
 
-def _emit(fields: Mapping[str, Place]) -> Emit:
-    return fields["emit"].one_of(Emit) if "emit" in fields else Emit.MESSAGE
+def _emit(fields: Mapping[str, Place], default: Emit = Emit.MESSAGE) -> Emit:
+    return fields["emit"].one_of(Emit) if "emit" in fields else default
 
 
 #: What a rule can demand.

@@ -92,6 +92,8 @@ class JoyActions:
     """What is done while an axis is held."""
     hysteresis: float = 0.1
     """How far an axis goes back before what it stands for ends."""
+    emit: Emit = Emit.CHANGE
+    """Whether what is held is said again with every message, or when it changes."""
 
 
 @dataclass(frozen=True, slots=True)

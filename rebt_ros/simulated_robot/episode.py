@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rebt_ros.simulated_robot.robot import TIME_STEP, Robot
+from rebt_ros.simulated_robot.robot import TIME_STEP, Robot, Velocity
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class Episode:
             round(robot.battery, 3),
         )
 
-    def step(self, action: str | None) -> None:
+    def step(self, command: str | Velocity | None) -> None:
         """Lets one time step pass."""
-        self.robot.step(action, self._time_step)
+        self.robot.step(command, self._time_step)
         self._steps += 1

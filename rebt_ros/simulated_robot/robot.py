@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from rebt_ros.simulated_robot.world import Point, World
 
@@ -15,9 +15,12 @@ TIME_STEP = 0.05
 #: Charge below which the robot's target is the dock.
 LOW_BATTERY = 0.35
 
-_RADIUS = 0.2
-_SPEED = 1.0
-_TURN_RATE = 1.0
+#: Largest speed of the robot, m/s, and of its turns, rad/s.
+SPEED: Final = 1.0
+TURN_RATE: Final = 1.0
+
+#: Of its hull, m.
+RADIUS: Final = 0.2
 _GOAL_RADIUS = 0.5
 _DOCK_RADIUS = 0.5
 _LONGEST_RANGE = 4.0
@@ -38,6 +41,25 @@ class Action(StrEnum):
     TURN_LEFT = "turn_left"
     TURN_RIGHT = "turn_right"
     CHARGE = "charge"
+
+
+class Velocity(NamedTuple):
+    """How fast the robot is to drive, as far as it can."""
+
+    linear: float
+    """Straight ahead, m/s."""
+    angular: float
+    """To the left, rad/s."""
+
+
+STANDING: Final = Velocity(0.0, 0.0)
+
+#: What the words mean that move the robot.
+VELOCITIES: Final = {
+    Action.GO: Velocity(SPEED, 0.0),
+    Action.TURN_LEFT: Velocity(0.0, TURN_RATE),
+    Action.TURN_RIGHT: Velocity(0.0, -TURN_RATE),
+}
 
 
 class State(NamedTuple):
@@ -85,6 +107,8 @@ class Robot:
         self.heading = source.uniform(-math.pi, math.pi)
         self.battery = source.uniform(0.2, 0.3) if start % 3 == 0 else source.uniform(0.6, 1.0)
         self.bumps = 0
+        self.velocity = STANDING
+        """How fast it has driven in the last time step."""
         self._touching = False
 
     @property
@@ -98,40 +122,58 @@ class Robot:
         return self.position.distance(self.world.dock) <= _DOCK_RADIUS
 
     @property
+    def target(self) -> Point:
+        """Where it has to go."""
+        return self.world.dock if self.battery < LOW_BATTERY else self.world.goal
+
+    @property
+    def bearing(self) -> float:
+        """Radians from its heading to its target, -pi..pi, positive to the left."""
+        return _wrapped(self.position.direction(self.target) - self.heading)
+
+    @property
     def state(self) -> State:
         """What it measures now."""
-        target = self.world.dock if self.battery < LOW_BATTERY else self.world.goal
         return State(
             self._free(_FRONT, _SIDE),
             self._free(-_FRONT, _FRONT),
             self._free(-_SIDE, -_FRONT),
-            _wrapped(self.position.direction(target) - self.heading),
+            self.bearing,
             self.battery,
             float(self.docked),
         )
 
-    def step(self, action: str | None, seconds: float = TIME_STEP) -> None:
+    def step(self, command: str | Velocity | None, seconds: float = TIME_STEP) -> None:
         """Obeys for a time step; without a word that it knows, and without charge, it stands."""
+        self.velocity = STANDING
         if self.battery <= 0 and not self.docked:
             return
-        moves = action in (Action.GO, Action.TURN_LEFT, Action.TURN_RIGHT)
-        if moves and not self.docked:
+        if command == Action.CHARGE:
+            self.battery = min(self.battery + _CHARGE * seconds * self.docked, 1.0)
+            return
+        if isinstance(command, Velocity):
+            self._drive(*command, seconds)
+        elif command in VELOCITIES:
+            self._drive(*VELOCITIES[Action(command)], seconds)
+
+    def _drive(self, linear: float, angular: float, seconds: float) -> None:
+        linear, angular = _bounded(linear, SPEED), _bounded(angular, TURN_RATE)
+        if not (linear or angular):
+            return
+        self.velocity = Velocity(linear, angular)
+        if not self.docked:
             self.battery = max(self.battery - _DRAIN * seconds, 0.0)
-        if action == Action.GO:
-            self._go(_SPEED * seconds)
-        elif action == Action.TURN_LEFT:
-            self.heading = _wrapped(self.heading + _TURN_RATE * seconds)
-        elif action == Action.TURN_RIGHT:
-            self.heading = _wrapped(self.heading - _TURN_RATE * seconds)
-        elif action == Action.CHARGE and self.docked:
-            self.battery = min(self.battery + _CHARGE * seconds, 1.0)
+        if linear:
+            self._go(linear * seconds)
+        if angular:
+            self.heading = _wrapped(self.heading + angular * seconds)
 
     def _go(self, distance: float) -> None:
         ahead = Point(
             self.position.x + distance * math.cos(self.heading),
             self.position.y + distance * math.sin(self.heading),
         )
-        blocked = self.world.clearance(ahead) < _RADIUS
+        blocked = self.world.clearance(ahead) < RADIUS
         if not blocked:
             self.position = ahead
         elif not self._touching:
@@ -141,7 +183,7 @@ class Robot:
     def _free(self, first: float, last: float) -> float:
         """What a range sensor measures between two directions, relative to the heading."""
         nearest = self.world.nearest(self.position, self.heading + first, self.heading + last)
-        return min(max(nearest - _RADIUS, 0.0), _LONGEST_RANGE)
+        return min(max(nearest - RADIUS, 0.0), _LONGEST_RANGE)
 
     def _free_position(self, source: random.Random) -> Point:
         """A place that is free to turn at, and not already at the goal."""
@@ -149,6 +191,11 @@ class Robot:
             place = Point(source.uniform(0, self.world.size), source.uniform(0, self.world.size))
             if self.world.clearance(place) > 0.6 and place.distance(self.world.goal) > 3.0:
                 return place
+
+
+def _bounded(value: float, largest: float) -> float:
+    """The value within -largest..largest; 0 where it is no number."""
+    return 0.0 if math.isnan(value) else min(max(value, -largest), largest)
 
 
 def _wrapped(angle: float) -> float:

@@ -27,7 +27,7 @@ from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.storage.tree_file import write_tree
 
-ROBOT = {"speedup": 100.0, "lockstep": True, "time_limit": 40.0}
+ROBOT = {"plain": True, "speedup": 100.0, "lockstep": True, "time_limit": 40.0}
 EXECUTOR = {"tick_on": "state", "state_timeout": 5.0}
 WORLD = [
     *("--outcome-topic", "robot/episode", "--outcome-field", "reached"),

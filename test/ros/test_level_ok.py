@@ -236,7 +236,7 @@ def test_two_executors_say_so_whatever_their_names(
 def test_a_demonstrator_says_that_nobody_is_there_and_who_gets_no_actions(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    with NodeProcess("demonstrator_node", domain, tmp_path) as demonstrator:
+    with NodeProcess("demonstrator_node", domain, tmp_path, {"plain": True}) as demonstrator:
         _warns(peer, "demonstrator", "nobody publishes on /state", "nobody listens to /action")
         heard = peer.listen(String, "action")
         values = [0.0] * len(State._fields)
@@ -256,7 +256,7 @@ def test_the_robots_say_who_is_missing(domain: int, peer: Peer, tmp_path: Path) 
     config = tmp_path / "config.json"
     config.write_text('{"type_": "sequence", "child_list": [{"type_": "action", "name": "wave"}]}')
     with (
-        NodeProcess("robot_node", domain, tmp_path, {}, ["-r", "action:=own_action"]),
+        NodeProcess("robot_node", domain, tmp_path, {"plain": True}, ["-r", "action:=own_action"]),
         NodeProcess("synthetic_robot_node", domain, tmp_path, {"config": config}),
     ):
         _warns(peer, "robot", "nobody publishes on /command", "nobody publishes on /own_action")

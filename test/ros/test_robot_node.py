@@ -3,24 +3,39 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
 
+from action_msgs.msg import GoalStatus
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParameters
+from rclpy.action.client import ActionClient
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from robot_episodes import run_episode
 from ros_processes import NodeProcess, Peer
+from sensor_msgs.msg import BatteryState, Joy
 from std_msgs.msg import Float64MultiArray, String
+from test_msgs.action import Fibonacci
 
+from rebt_ros.ros.robots.standard_messages import STATE_TOPICS, state_messages, state_of
 from rebt_ros.simulated_robot.demonstrator import decide
 from rebt_ros.simulated_robot.robot import Robot, State
 from rebt_ros.simulated_robot.world import furnished_room
+
+PLAIN: dict[str, Any] = {"plain": True, "first_start": 4}
+
+#: It stands on the dock with a quarter of its charge, and the scanner sees all there is to see.
+DOCKED: dict[str, Any] = {"first_start": 18, "time_limit": 3600.0}
 
 EPISODES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -38,7 +53,7 @@ def _set(peer: Peer, name: str, value: object) -> Any:
 def test_it_publishes_named_states_and_stands_still_until_it_is_commanded(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    with NodeProcess("robot_node", domain, tmp_path, {"first_start": 4}):
+    with NodeProcess("robot_node", domain, tmp_path, PLAIN):
         states = peer.listen(Float64MultiArray, "state")
         peer.wait_until(lambda: len(states) >= 10)
         assert {tuple(one.data) for one in states} == {Robot(furnished_room(), 4).state}
@@ -51,7 +66,7 @@ def test_it_publishes_named_states_and_stands_still_until_it_is_commanded(
 def test_it_obeys_until_the_command_is_too_old(
     domain: int, peer: Peer, tmp_path: Path, topic: str
 ) -> None:
-    with NodeProcess("robot_node", domain, tmp_path, {"first_start": 4, "speedup": 5.0}):
+    with NodeProcess("robot_node", domain, tmp_path, PLAIN | {"speedup": 5.0}):
         states = peer.listen(Float64MultiArray, "state")
         peer.wait_until(lambda: states)
         start = _bearing(states)
@@ -65,7 +80,7 @@ def test_it_obeys_until_the_command_is_too_old(
 
 
 def test_an_unknown_word_stops_it(domain: int, peer: Peer, tmp_path: Path) -> None:
-    parameters = {"first_start": 4, "command_timeout": 60.0}
+    parameters = PLAIN | {"command_timeout": 60.0}
     with NodeProcess("robot_node", domain, tmp_path, parameters):
         states = peer.listen(Float64MultiArray, "state")
         peer.wait_until(lambda: states)
@@ -76,13 +91,14 @@ def test_an_unknown_word_stops_it(domain: int, peer: Peer, tmp_path: Path) -> No
         peer.wait_until(lambda: len({tuple(one.data) for one in states[-10:]}) == 1)
 
 
+@pytest.mark.parametrize("plain", [False, True])
 def test_the_demonstrator_drives_it_run_after_run_as_in_the_simulation_alone(
-    domain: int, peer: Peer, tmp_path: Path
+    domain: int, peer: Peer, tmp_path: Path, plain: bool
 ) -> None:
-    parameters = {"first_start": 20, "speedup": 40.0, "lockstep": True}
+    parameters = {"first_start": 20, "speedup": 40.0, "lockstep": True, "plain": plain}
     with (
         NodeProcess("robot_node", domain, tmp_path, parameters),
-        NodeProcess("demonstrator_node", domain, tmp_path),
+        NodeProcess("demonstrator_node", domain, tmp_path, {"plain": plain}),
     ):
         late = peer.listen(String, "robot/episode", EPISODES)
         peer.wait_until(lambda: len(late) >= 2)
@@ -92,13 +108,16 @@ def test_the_demonstrator_drives_it_run_after_run_as_in_the_simulation_alone(
     for run in runs:
         alone = run_episode(Robot(furnished_room(), run["start"]), decide, 60.0)
         assert (run["reached"], run["bumps"]) == (alone.reached, alone.bumps) == (True, 0)
-        assert run["seconds"] == pytest.approx(alone.seconds, abs=1.0)
+        # What it charges takes as long as others take to say so, unless it is plain.
+        if plain:
+            assert run["seconds"] == pytest.approx(alone.seconds, abs=1.0)
 
 
 def test_a_disabled_demonstrator_says_nothing_and_survives_foreign_states(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
-    with NodeProcess("demonstrator_node", domain, tmp_path, {"enabled": False}) as node:
+    parameters = {"enabled": False, "plain": True}
+    with NodeProcess("demonstrator_node", domain, tmp_path, parameters) as node:
         actions = peer.listen(String, "action")
         state = Robot(furnished_room(), 4).state
         peer.state(*state, labels=[",".join(State._fields)])
@@ -109,6 +128,124 @@ def test_a_disabled_demonstrator_says_nothing_and_survives_foreign_states(
         peer.state(*state, labels=[",".join(State._fields)])
         peer.wait_until(lambda: actions)
         assert [one.data for one in actions] == [decide(state)]
+
+
+def test_a_demonstrator_with_a_joystick_lets_it_go_when_it_is_disabled(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("demonstrator_node", domain, tmp_path):
+        joysticks, velocities = peer.listen(Joy, "joy"), peer.listen(Twist, "cmd_vel")
+        robot = Robot(furnished_room(), 4)
+        assert decide(robot.state) == "turn_left"
+
+        def turning() -> bool:
+            for topic, message in state_messages(robot, Time(), charging=False).items():
+                peer.publish(message, topic)
+            peer.spin_once()
+            return bool(joysticks and velocities)
+
+        peer.wait_until(turning)
+        assert list(joysticks[-1].axes) == [0.0, 0.0, 0.0, 1.0]
+        assert (velocities[-1].linear.x, velocities[-1].angular.z) == (0.0, 1.0)
+        assert peer.call("demonstrator/enable", False).success
+        peer.wait_until(lambda: not any(joysticks[-1].axes) and velocities[-1] == Twist())
+
+
+def test_it_publishes_standard_messages_of_what_it_measures(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    robot = Robot(furnished_room(), 18)
+    with NodeProcess("robot_node", domain, tmp_path, DOCKED):
+        heard = {topic: peer.listen(kind, topic) for topic, kind in STATE_TOPICS.items()}
+        peer.wait_until(lambda: all(heard.values()))
+        messages = {topic: its[-1] for topic, its in heard.items()}
+    assert state_of(messages) == pytest.approx(robot.state, abs=0.02)
+    pose = messages["odom"].pose.pose
+    assert (pose.position.x, pose.position.y) == (robot.position.x, robot.position.y)
+    assert 2 * math.atan2(pose.orientation.z, pose.orientation.w) == pytest.approx(robot.heading)
+    ranges = np.array(messages["scan"].ranges)
+    assert np.isinf(ranges).sum() == 83
+    assert np.isnan(ranges).sum() == 1
+    near = robot.position.distance(robot.target)
+    assert messages["target"].pose.position.x == pytest.approx(near * math.cos(robot.bearing))
+
+
+def test_it_drives_by_velocity_and_not_before_one_that_moves_it(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    parameters = {"first_start": 4, "speedup": 5.0, "command_timeout": 60.0}
+    with NodeProcess("robot_node", domain, tmp_path, parameters):
+        odometry = peer.listen(Odometry, "odom")
+        peer.publish(Twist(), "cmd_vel")
+        assert "waiting" in peer.wait_until(peer.anew("robot: simulation")).message
+        velocity = Twist()
+        velocity.linear.x, velocity.angular.z = 0.5, -math.inf
+        peer.publish(velocity, "cmd_vel")
+        peer.wait_until(lambda: odometry[-1].twist.twist.linear.x == 0.5)
+        assert odometry[-1].twist.twist.angular.z == -1.0
+        velocity.linear.x, velocity.angular.z = math.nan, 0.0
+        peer.publish(velocity, "cmd_vel")
+        peer.wait_until(lambda: odometry[-1].twist.twist == Twist())
+
+
+def _charge(peer: Peer, client: ActionClient, order: int) -> Any:
+    """Asks for a charge; the handle of the goal once it is decided on."""
+    peer.wait_until(client.server_is_ready, what="the action server")
+    future = client.send_goal_async(Fibonacci.Goal(order=order))
+    return peer.wait_until(lambda: future.done() and future.result())
+
+
+def _result(peer: Peer, handle: Any) -> Any:
+    future = handle.get_result_async()
+    return peer.wait_until(lambda: future.done() and future.result())
+
+
+def test_it_charges_on_the_dock_as_far_as_it_is_asked_to(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    client = ActionClient(peer.node, Fibonacci, "charge")
+    with NodeProcess("robot_node", domain, tmp_path, DOCKED | {"speedup": 20.0}) as robot:
+        batteries = peer.listen(BatteryState, "battery_state")
+        for order in (0, 101):
+            assert not _charge(peer, client, order).accepted
+        result = _result(peer, _charge(peer, client, 40))
+        assert result.status == GoalStatus.STATUS_SUCCEEDED
+        reached = list(result.result.sequence)
+        assert reached == sorted(set(reached))
+        assert 24 <= reached[0] < reached[-1] == 40
+        peer.wait_until(lambda: batteries[-1].power_supply_status == 2)
+        assert batteries[-1].percentage == pytest.approx(0.4, abs=0.02)
+        # One that is cancelled, and one that another one replaces.
+        handle = _charge(peer, client, 100)
+        peer.wait_until(lambda: batteries[-1].power_supply_status == 1)
+        handle.cancel_goal_async()
+        assert _result(peer, handle).status == GoalStatus.STATUS_CANCELED
+        first, second = _charge(peer, client, 100), _charge(peer, client, 1)
+        assert _result(peer, first).status == GoalStatus.STATUS_ABORTED
+        assert _result(peer, second).status == GoalStatus.STATUS_SUCCEEDED
+        assert robot.stop() == 0
+        assert "Traceback" not in robot.stderr
+
+
+def test_it_does_not_charge_off_the_dock_and_gives_up_a_goal_at_a_reset(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    client = ActionClient(peer.node, Fibonacci, "charge")
+    with NodeProcess("robot_node", domain, tmp_path, DOCKED) as robot:
+        handle = _charge(peer, client, 100)
+        assert handle.accepted
+        assert peer.call("robot/reset").success
+        assert _result(peer, handle).status == GoalStatus.STATUS_ABORTED
+        assert not _charge(peer, client, 100).accepted
+        assert robot.stop() == 0
+
+
+def test_it_ends_in_good_order_while_it_charges(domain: int, peer: Peer, tmp_path: Path) -> None:
+    client = ActionClient(peer.node, Fibonacci, "charge")
+    with NodeProcess("robot_node", domain, tmp_path, DOCKED) as robot:
+        assert _charge(peer, client, 100).accepted
+        assert robot.stop() == 0
+        assert "Traceback" not in robot.stderr
 
 
 def test_reset_begins_at_the_next_start_or_at_a_new_first_one(
@@ -126,7 +263,7 @@ def test_reset_begins_at_the_next_start_or_at_a_new_first_one(
 
 
 def test_a_run_that_takes_too_long_is_told_as_lost(domain: int, peer: Peer, tmp_path: Path) -> None:
-    parameters = {"time_limit": 1.0, "speedup": 10.0}
+    parameters = {"time_limit": 1.0, "speedup": 10.0, "plain": True}
     with NodeProcess("robot_node", domain, tmp_path, parameters):
         episodes = peer.listen(String, "robot/episode", EPISODES)
         peer.action("stop", "command")
@@ -142,7 +279,7 @@ def test_a_signal_ends_it_in_good_order(
     domain: int, peer: Peer, tmp_path: Path, module: str, number: int
 ) -> None:
     with NodeProcess(module, domain, tmp_path) as node:
-        peer.listen(*((Float64MultiArray, "state") if "robot" in module else (String, "action")))
+        peer.listen(*((Odometry, "odom") if "robot" in module else (Joy, "joy")))
         assert node.stop(number) == 0
         assert "Traceback" not in node.stderr
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 from rclpy.node import Node
-from std_msgs.msg import Float64MultiArray, String
+from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
 from std_srvs.srv import SetBool
 
-from rebt_ros.demonstration.fields import names_of, values_of
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.graph_watch import GraphWatch
 from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.robots.plain_hands import PlainHands
+from rebt_ros.ros.robots.standard_hands import StandardHands
 from rebt_ros.simulated_robot.demonstrator import decide
 from rebt_ros.simulated_robot.robot import State
 
@@ -21,19 +25,34 @@ from rebt_ros.simulated_robot.robot import State
 _PATIENCE = 5.0
 
 
-def declare_settings(node: Node) -> bool:
-    """Declares and reads the parameters.
+@dataclass(frozen=True, slots=True)
+class DemonstratorSettings:
+    """What the demonstrator was started with."""
 
-    Returns:
-        Whether to drive from the start.
+    enabled: bool
+    """Whether to drive from the start."""
+    plain: bool
+    """Whether the robot speaks arrays of numbers and words."""
+
+
+def declare_settings(node: Node) -> DemonstratorSettings:
+    """Declares and reads the parameters.
 
     Raises:
         OptionError: One makes no sense.
     """
     declare = Parameters(node)
-    enabled = declare.flag("enabled", True, "Whether to drive from the start.")()
+    settings = DemonstratorSettings(
+        enabled=declare.flag("enabled", True, "Whether to drive from the start.")(),
+        plain=declare.flag(
+            "plain",
+            False,
+            "Whether the robot speaks arrays of numbers and words, instead of the messages of real "
+            "robots.",
+        )(),
+    )
     declare.refuse_others()
-    return enabled
+    return settings
 
 
 class Patience:
@@ -59,6 +78,21 @@ class Patience:
         return self._clock() - self._since <= self._limit
 
 
+class Hands(Protocol):
+    """What a person drives the robot with."""
+
+    @property
+    def states(self) -> Sequence[Subscription]:
+        """What is seen."""
+
+    @property
+    def actions(self) -> Sequence[Publisher]:
+        """What is done."""
+
+    def act(self, action: str | None) -> None:
+        """Does something; None: lets go."""
+
+
 class DemonstratorNode(Node):
     """Drives the simulated robot while it is enabled.
 
@@ -68,48 +102,46 @@ class DemonstratorNode(Node):
 
     def __init__(self) -> None:
         super().__init__("demonstrator")
-        self._enabled = declare_settings(self)
+        settings = declare_settings(self)
+        self._enabled = settings.enabled
         self._faults = Faults(self.get_logger())
         self._watch = GraphWatch(self)
         self._patience = Patience(_PATIENCE)
         self._answered = 0
-        self._actions = self.create_publisher(String, "action", 10)
-        self._states = self.create_subscription(Float64MultiArray, "state", self._on_state, 1)
+        self._hands: Hands = (
+            PlainHands(self, self._on_state, self._faults.note)
+            if settings.plain
+            else StandardHands(self, self._on_state)
+        )
         self.create_service(SetBool, "~/enable", self._on_enable)
         self._diagnostics = Diagnostics(self, "demonstration", self._report)
         self.get_logger().info(self._what_it_does())
 
-    def _on_state(self, message: Float64MultiArray) -> None:
-        if not self._enabled:
-            return
-        fields, values = names_of(message), values_of(message)
-        if fields != State._fields:
-            self._faults.note(
-                "foreign state",
-                f"a state of {len(values)} values is left out: "
-                f"its layout must name {', '.join(State._fields)}.",
-            )
-            return
-        if self._is_heard():
-            self._actions.publish(String(data=decide(values)))
+    def _on_state(self, state: State) -> None:
+        if self._enabled and self._is_heard():
+            self._hands.act(decide(state))
             self._answered += 1
 
     def _is_heard(self) -> bool:
         """Whether all who listen to the actions will get them; waits for them a while only."""
-        connected = self._actions.get_subscription_count()
-        there = self.count_subscribers(self._actions.topic_name)
-        if self._patience.lasts(missing=connected < there):
+        actions = self._hands.actions
+        connected = {one.topic_name: one.get_subscription_count() for one in actions}
+        there = {one.topic_name: self.count_subscribers(one.topic_name) for one in actions}
+        missing = {name: there[name] - connected[name] for name in there}
+        if self._patience.lasts(missing=any(count > 0 for count in missing.values())):
             return False
-        if connected >= there:
-            return True
-        self._faults.note(
-            "subscriber not connected",
-            f"{there - connected} of {there} subscribers of {self._actions.topic_name} are not "
-            "connected and get no actions: check their types and QoS.",
-        )
+        for name, count in missing.items():
+            if count > 0:
+                self._faults.note(
+                    "subscriber not connected",
+                    f"{count} of {there[name]} subscribers of {name} are not connected and get no "
+                    "actions: check their types and QoS.",
+                )
         return True
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        if self._enabled and not request.data:
+            self._hands.act(None)
         self._enabled = request.data
         response.success = True
         response.message = self._what_it_does()
@@ -121,7 +153,8 @@ class DemonstratorNode(Node):
     def _report(self) -> Report:
         watch = self._watch
         values = {"enabled": self._enabled, "actions": self._answered, **self._faults.counts}
-        findings = [*watch.unheard([self._states]), *watch.unread([self._actions.topic_name])]
+        topics = [action.topic_name for action in self._hands.actions]
+        findings = [*watch.unheard(self._hands.states), *watch.unread(topics)]
         problems = watch.say(findings if self._enabled else ())
         if self._enabled and self._faults.recent:
             problems.insert(0, self._faults.recent)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Final
+from typing import Final, Protocol
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String
+from rclpy.subscription import Subscription
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from rebt_ros.errors import OptionError
@@ -18,8 +19,10 @@ from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
 from rebt_ros.ros.graph_watch import GraphWatch
 from rebt_ros.ros.parameters import Parameters
+from rebt_ros.ros.robots.plain_interface import PlainInterface
+from rebt_ros.ros.robots.standard_interface import StandardInterface
 from rebt_ros.simulated_robot.episode import Episode
-from rebt_ros.simulated_robot.robot import Robot, State
+from rebt_ros.simulated_robot.robot import STANDING, Action, Robot, Velocity
 from rebt_ros.simulated_robot.world import furnished_room
 
 _LARGEST_START: Final = 2**31 - 1
@@ -32,6 +35,8 @@ _REMEMBERED: Final = 1000
 class RobotSettings:
     """What the robot was started with; times are simulated seconds."""
 
+    plain: bool
+    """Whether it speaks arrays of numbers and words, and not the messages of real robots."""
     command_topics: tuple[str, ...]
     rate: float
     """Time steps per simulated second."""
@@ -53,11 +58,18 @@ def declare_settings(node: Node) -> RobotSettings:
     """
     declare = Parameters(node)
     command_topics = declare.texts(
-        "command_topics", ["command", "action"], "String topics to obey; the last word counts."
+        "command_topics",
+        ["command", "action"],
+        "String topics to obey where it is plain; the last word counts.",
     )()
     if not command_topics:
         raise OptionError("parameter 'command_topics' is empty: name at least one topic.")
     settings = RobotSettings(
+        plain=declare.flag(
+            "plain",
+            False,
+            "Whether to speak arrays of numbers and words, instead of the messages of real robots.",
+        )(),
         command_topics=command_topics,
         rate=declare.number("rate", 20.0, "Time steps per simulated second (Hz).", 5.0, 200.0)(),
         speedup=declare.number(
@@ -93,11 +105,22 @@ def declare_settings(node: Node) -> RobotSettings:
     return settings
 
 
-def _layout() -> MultiArrayLayout:
-    """How the values of a state are named."""
-    names = ",".join(State._fields)
-    size = len(State._fields)
-    return MultiArrayLayout(dim=[MultiArrayDimension(label=names, size=size, stride=size)])
+class Interface(Protocol):
+    """How the robot and others speak with each other."""
+
+    @property
+    def charging(self) -> bool:
+        """Whether the robot charges, and does nothing else."""
+
+    @property
+    def commands(self) -> Sequence[Subscription]:
+        """Where commands come in."""
+
+    def publish(self, robot: Robot) -> None:
+        """Says what the robot measures now."""
+
+    def reset(self) -> None:
+        """A run begins."""
 
 
 class RobotNode(Node):
@@ -119,59 +142,63 @@ class RobotNode(Node):
         self._patience = max(round(settings.command_timeout * settings.rate), 1)
         self._new_first_start = False
         self._runs = 0
-        self._command: str | None = None
+        self._command: str | Velocity | None = None
         self._robot = Robot(furnished_room())
-        self._layout = _layout()
+        self._interface: Interface = (
+            PlainInterface(self, settings.command_topics, self._obey)
+            if settings.plain
+            else StandardInterface(
+                self, self._robot, self._obey, self._answer if settings.lockstep else None
+            )
+        )
         self._begin(settings.first_start())
         self._open()
+        topics = [command.topic_name for command in self._interface.commands]
         self.get_logger().info(
             f"standing at start {self._robot.start}, waiting for a command on "
-            f"{' or '.join(settings.command_topics)}."
+            f"{' or '.join(topics)}."
         )
 
     def _open(self) -> None:
-        """Opens everything that publishes or calls back."""
+        """Opens everything else that publishes or calls back."""
         settings = self._settings
-        self._states = self.create_publisher(Float64MultiArray, "state", 10)
         self._episodes = self.create_publisher(
             String,
             "~/episode",
             QoSProfile(depth=_REMEMBERED, durability=DurabilityPolicy.TRANSIENT_LOCAL),
         )
-        # A queue would only make commands late.
-        self._commands = [
-            self.create_subscription(String, topic, self._on_command, 1)
-            for topic in dict.fromkeys(settings.command_topics)
-        ]
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.add_post_set_parameters_callback(self._on_parameters)
         self.create_timer(1.0 / (settings.rate * settings.speedup), self._on_tick)
         self._watch = GraphWatch(self)
         self._diagnostics = Diagnostics(self, "simulation", self._report)
 
-    def _on_command(self, message: String) -> None:
-        self._command = message.data
+    def _obey(self, command: str | Velocity | None) -> None:
+        self._command = command
+        self._answer()
+        # Who halts a robot that waits does not begin a run.
+        self._under_way |= command != STANDING
+
+    def _answer(self) -> None:
         self._silence = 0
         self._answered = True
-        self._under_way = True
 
     def _on_parameters(self, parameters: list[Parameter]) -> None:
         self._new_first_start |= any(parameter.name == "first_start" for parameter in parameters)
 
     def _on_tick(self) -> None:
         self._silence += 1
-        if not self._under_way or (self._settings.lockstep and not self._answered):
+        waits = self._settings.lockstep and not self._answered
+        if not self._under_way or waits:
             if self._silence % self._repeat_every == 0:
-                self._publish_state()
+                self._interface.publish(self._robot)
             return
         self._answered = False
-        self._episode.step(self._command if self._silence <= self._patience else None)
+        command = self._command if self._silence <= self._patience else None
+        self._episode.step(Action.CHARGE if self._interface.charging else command)
         if self._episode.over:
             self._finish()
-        self._publish_state()
-
-    def _publish_state(self) -> None:
-        self._states.publish(Float64MultiArray(layout=self._layout, data=self._robot.state))
+        self._interface.publish(self._robot)
 
     def _finish(self) -> None:
         result = self._episode.result
@@ -187,6 +214,7 @@ class RobotNode(Node):
     def _begin(self, start: int) -> None:
         """Stands at a start until the next command."""
         self._robot.begin(start)
+        self._interface.reset()
         self._episode = Episode(self._robot, self._settings.time_limit, self._time_step)
         self._under_way = False
         self._answered = False
@@ -194,11 +222,11 @@ class RobotNode(Node):
         self._silence = 0
 
     def _report(self) -> Report:
-        watch = self._watch
+        watch, commands = self._watch, self._interface.commands
         # One who commands is enough.
-        findings = [*watch.timeless(), *watch.misfits(self._commands)]
-        if not any(watch.publishing(command.topic_name) for command in self._commands):
-            findings += watch.unheard(self._commands)
+        findings = [*watch.timeless(), *watch.misfits(commands)]
+        if not any(watch.publishing(command.topic_name) for command in commands):
+            findings += watch.unheard(commands)
         problems = watch.say(findings)
         message = "under way" if self._under_way else "waiting for a command"
         values = {"run": self._runs + 1, "start": self._robot.start}
