@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
+import robot_file_reference
 import strategies as some
 
 from rebt_ros.behavior_tree import document
@@ -13,6 +15,7 @@ from rebt_ros.behavior_tree.shown import MOST_SHOWN_LEAVES
 from rebt_ros.beyond_the_paper import reductions
 from rebt_ros.decision_tree import simplest
 from rebt_ros.learning import suggesting
+from rebt_ros.robot_file.reading import json_schema
 
 #: And the kind of a feature that has one.
 KINDS_OF_NODES = frozenset({"action", "condition", "inverter", "categorical"})
@@ -43,6 +46,14 @@ def test_the_page_on_formats_names_each_type_of_condition() -> None:
     assert [
         name for name in sorted(types) if f"`{name}`" not in page and f'"{name}"' not in page
     ] == []
+
+
+def test_the_reference_of_robot_files_is_that_of_their_schema() -> None:
+    made = robot_file_reference.reference()
+    assert made == robot_file_reference.PAGE.read_text(encoding="utf-8")
+    schema: Any = json_schema()
+    maps = {name for name, form in schema["$defs"].items() if "properties" in form}
+    assert maps == robot_file_reference._TITLES.keys()
 
 
 def test_the_page_on_learning_names_the_limits() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +50,24 @@ def _recorder(
     )
 
 
+class _Bag:
+    """What `ros2 bag record` writes beside the recorder: messages in the order of their sending."""
+
+    def __init__(self, peer: Peer, messages: list[Any]) -> None:
+        self.messages: list[tuple[int, str, Any]] = []
+        for topic, kind in {topic: type(message) for _, topic, message in messages}.items():
+            peer.node.create_subscription(kind, topic, partial(self._take, topic), 1000)
+
+    def _take(self, topic: str, message: Any, info: dict[str, Any]) -> None:
+        self.messages.append((info["source_timestamp"], topic, message))
+
+
 def _record(
-    domain: int, peer: Peer, directory: Path, messages: list[Any], text: str
+    domain: int, peer: Peer, directory: Path, messages: list[Any], text: str, listeners: int = 1
 ) -> Demonstration:
     with _recorder(domain, directory, text) as recorder:
+        for _, topic, message in messages if listeners > 1 else ():
+            peer.connect(type(message), topic, subscribers=listeners)
         for place, (_, topic, message) in enumerate(messages):
             peer.publish(message, topic)
             if place % 10 == 0:
@@ -64,12 +79,14 @@ def _record(
 
 
 @pytest.mark.parametrize("text", [some.ROBOT_FILE, TYPES + some.ROBOT_FILE])
-def test_a_bag_and_a_recording_of_the_same_messages_give_the_same_table_and_tree(
+def test_a_bag_that_is_written_beside_the_recorder_gives_its_table_and_its_tree(
     domain: int, peer: Peer, tmp_path: Path, text: str
 ) -> None:
     messages = some.shown(12)
-    recorded = _record(domain, peer, tmp_path, messages, text)
-    bag = some.write_bag(tmp_path / "bag", messages)
+    listening = _Bag(peer, messages)
+    recorded = _record(domain, peer, tmp_path, messages, text, listeners=2)
+    peer.wait_until(lambda: len(listening.messages) == len(messages), what="the bag")
+    bag = some.write_bag(tmp_path / "bag", sorted(listening.messages, key=lambda one: one[0]))
     robot = parse_robot_file(text)
     reading = InputOptions(robot=robot)
     [bagged] = load([bag], reading).demonstrations
@@ -85,6 +102,30 @@ def test_a_bag_and_a_recording_of_the_same_messages_give_the_same_table_and_tree
     ]
     assert learned[0].tree == learned[1].tree
     assert learned[0].robot == learned[1].robot == robot
+
+
+@pytest.mark.parametrize("stamp", ["header", "received"])
+def test_the_stamp_in_the_header_says_which_state_an_action_belongs_to_where_that_is_wanted(
+    domain: int, peer: Peer, tmp_path: Path, stamp: str
+) -> None:
+    text = (
+        "state: {x: /odom.pose.pose.position.x}\nactions: {a: {joy: /joy, press: {0: grasp}}}\n"
+        f"topics: {{/odom: {{stamp: {stamp}}}, /joy: {{stamp: {stamp}}}}}"
+    )
+    messages = []
+    # The camera of an odometry that is slow to compute: it tells late what was before the action.
+    for number in range(6):
+        for topic, message, moment in (
+            ("/odom", some.odometry(10.0 * number), 10 * number),
+            ("/joy", some.joy(), 10 * number + 1),
+            ("/odom", some.odometry(10.0 * number + 5.0), 10 * number + 5),
+            ("/joy", some.joy(0), 10 * number + 3),
+        ):
+            message.header.stamp.sec, message.header.stamp.nanosec = 1_700_000_000, moment
+            messages.append((0, topic, message))
+    recorded = _record(domain, peer, tmp_path, messages, text)
+    held = [10.0 * number + (5.0 if stamp == "received" else 0.0) for number in range(6)]
+    assert recorded.states[:, 0].tolist() == held
 
 
 def test_an_array_that_shrinks_and_a_field_that_turns_nan_are_missing_and_nothing_is_lost(
