@@ -21,6 +21,7 @@ import checking
 import learning
 import node_rows
 import reading
+import robot_nodes
 import robot_reading
 import running
 from harness import CHECKOUT, Figure, Settings, table, write
@@ -38,6 +39,8 @@ ROWS: dict[str, Callable[[Settings], list[Figure]]] = {
     "rest": node_rows.rest,
     "recorder": node_rows.recorder_cpu,
     "latency": node_rows.latency,
+    "robot-recorder": robot_nodes.recorder_cpu,
+    "robot-latency": robot_nodes.latency,
     "growth": learning.growth,
     "worst": learning.worst,
 }

@@ -18,8 +18,7 @@ from rebt_ros.storage.robot_bag import read_robot_bag
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 _BEAMS = 360
 
-ROBOT = parse_robot_file(
-    """
+ROBOT_FILE = """\
 state:
   x: /odom.pose.pose.position.x
   y: /odom.pose.pose.position.y
@@ -34,7 +33,7 @@ state:
 actions:
   action: {joy: /joy, press: {0: grasp}, axes: {1: {0.5: forward, -0.5: back}}}
 """
-)
+ROBOT = parse_robot_file(ROBOT_FILE)
 
 
 def robot_bag(settings: Settings) -> list[Figure]:
