@@ -28,6 +28,7 @@ _TITLES: Final = {
     "joy_actions": "Actions from a joystick",
     "twist_actions": "Actions from a velocity",
     "log_actions": "Actions from another behavior tree",
+    "rule": "A rule",
     "publish_command": "A command that publishes",
     "call_command": "A command that calls a service",
     "goal_command": "A command that sends a goal",
