@@ -70,7 +70,7 @@ def form_of(hint: Any, known: Known | None = None) -> Form[Any]:
     if get_origin(hint) is Annotated:
         hint, *notes = get_args(hint)
         bounds = next((note for note in notes if isinstance(note, Bounds)), _UNBOUNDED)
-    if known and hint in known:
+    if known is not None and hint in known:
         return known[hint]
     if get_origin(hint) in (Union, UnionType):
         choices = [choice for choice in get_args(hint) if choice is not NoneType]
@@ -78,7 +78,7 @@ def form_of(hint: Any, known: Known | None = None) -> Form[Any]:
             return OrNull(form_of(choices[0], known))
     if get_origin(hint) is tuple:
         return _tuple_form(get_args(hint), bounds, known)
-    if get_origin(hint) is dict:
+    if get_origin(hint) in (dict, Mapping):
         key, value = get_args(hint)
         return Table(form_of(key, known), form_of(value, known))
     return _plain_form(hint, bounds, known)

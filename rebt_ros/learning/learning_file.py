@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from enum import Enum
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +13,8 @@ import numpy.typing as npt
 from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.behavior_tree import document
 from rebt_ros.behavior_tree.nodes import Action
-from rebt_ros.beyond_the_paper.reductions import Reductions
+from rebt_ros.codec.form import MisfitError
+from rebt_ros.codec.hints import record
 from rebt_ros.decision_tree.encoding import Vocabulary, columns
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.grown import GrownTree
@@ -82,6 +82,42 @@ def load_learning(path: str | Path) -> Learning:
         raise InputError(f"{path} cannot be used: {err}") from err
 
 
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """How a decision tree was fitted."""
+
+    history: History
+    differences: tuple[tuple[str, str], ...]
+    max_depth: int | None
+    random_state: int
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    """What the file says beside its arrays."""
+
+    version: int
+    plain: str
+    """The document of the tree without suggestions attached."""
+    channel: str
+    actions: tuple[str, ...]
+    demonstrations: tuple[str, ...]
+    ccp_alpha: float
+    psa: bool
+    reasons: tuple[str, ...]
+    late: tuple[str, ...]
+    further: tuple[str, ...]
+    options: LearnOptions
+    fitted: _Fit
+    judge: _Fit
+
+
+_WORDS: Final = record(
+    _Words, known={LearnOptions: record(LearnOptions, tolerant=True)}, tolerant=True
+)
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Saved:
     """What a file of a learned policy holds."""
@@ -104,22 +140,22 @@ def saved(learning: Learning) -> Saved | None:
         arrays |= {f"{role}.{name}": getattr(fitted.grown, name) for name in _TREE}
     if learning.policy.levels is not None:
         arrays |= {f"levels.{name}": getattr(learning.policy.levels, name) for name in _LEVELS}
-    words = {
-        "version": VERSION,
-        "plain": document.dumps(learning.plain),
-        "channel": table.channel,
-        "actions": list(table.actions),
-        "demonstrations": list(table.demonstrations),
-        "ccp_alpha": learning.policy.ccp_alpha,
-        "psa": evidence.psa,
-        "reasons": list(learning.policy.reasons),
-        "late": list(learning.late),
-        "further": list(learning.further),
-        "options": _plain(asdict(evidence.options)),
-        "fitted": _fit_words(evidence.fitted),
-        "judge": _fit_words(evidence.judge),
-    }
-    return Saved(words, arrays)
+    words = _Words(
+        version=VERSION,
+        plain=document.dumps(learning.plain),
+        channel=table.channel,
+        actions=table.actions,
+        demonstrations=table.demonstrations,
+        ccp_alpha=learning.policy.ccp_alpha,
+        psa=evidence.psa,
+        reasons=learning.policy.reasons,
+        late=learning.late,
+        further=learning.further,
+        options=evidence.options,
+        fitted=_fit(evidence.fitted),
+        judge=_fit(evidence.judge),
+    )
+    return Saved(_WORDS.encode(words), arrays)
 
 
 def restored(kept: Saved) -> Learning:
@@ -133,24 +169,24 @@ def restored(kept: Saved) -> Learning:
             f"it is of version {kept.words.get('version')!r}, where {VERSION} is read: learn again."
         )
     try:
-        return _restored(kept.words, kept.arrays)
+        return _restored(_WORDS.decode(kept.words), kept.arrays)
+    except MisfitError as err:
+        raise InputError(f"{err.sentence('what it says').rstrip('.')}: learn again.") from err
     except (RebtError, KeyError, TypeError, ValueError, IndexError, AttributeError) as err:
         raise InputError(f"its parts do not fit each other ({err}): learn again.") from err
 
 
-def _restored(words: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> Learning:
-    plain = document.loads(words["plain"])
-    options = _options(words["options"])
-    channel, actions = words["channel"], _texts(words, "actions")
-    if {Action(label, channel) for label in actions} != set(plain.actions):
+def _restored(words: _Words, arrays: Mapping[str, npt.NDArray[Any]]) -> Learning:
+    plain = document.loads(words.plain)
+    if {Action(label, words.channel) for label in words.actions} != set(plain.actions):
         raise ValueError("the actions are not those of the tree")
     table = DemonstrationTable(
-        channel,
+        words.channel,
         plain.features,
         _of(arrays, "table.states", np.float64, 2),
-        actions,
+        words.actions,
         _of(arrays, "table.chosen", np.int64),
-        _texts(words, "demonstrations"),
+        words.demonstrations,
         _of(arrays, "table.demonstration", np.int64),
         _of(arrays, "table.stamps", np.int64),
         before=_of(arrays, "table.before", np.int64) if "table.before" in arrays else None,
@@ -163,10 +199,10 @@ def _restored(words: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) 
     if held_out.shape != (len(table),):
         raise ValueError("rows held out are not those of the table")
     fitted, judge = (
-        _fitted(words[role], {name: arrays[f"{role}.{name}"] for name in _TREE}, table)
-        for role in ("fitted", "judge")
+        _fitted(fit, {name: arrays[f"{role}.{name}"] for name in _TREE}, table)
+        for role, fit in (("fitted", words.fitted), ("judge", words.judge))
     )
-    evidence = Evidence(table, held_out, fitted, judge, bool(words["psa"]), options)
+    evidence = Evidence(table, held_out, fitted, judge, words.psa, words.options)
     levels = None
     if "levels.hits" in arrays:
         levels = JudgedLevels(
@@ -176,66 +212,33 @@ def _restored(words: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) 
             _of(arrays, "levels.leaves", np.int64),
             _of(arrays, "levels.explanations", np.int64),
         )
-    policy = ChosenPolicy(
-        fitted, float(words["ccp_alpha"]), evidence.psa, levels, _texts(words, "reasons")
-    )
+    policy = ChosenPolicy(fitted, words.ccp_alpha, words.psa, levels, words.reasons)
     return learned_as_asked(
         plain,
         evidence.decision_tree_at(policy.ccp_alpha),
         policy,
         evidence,
-        late=_texts(words, "late"),
-        further=_texts(words, "further"),
+        late=words.late,
+        further=words.further,
     )
 
 
-def _texts(words: Mapping[str, Any], name: str) -> tuple[str, ...]:
-    found = words[name]
-    if not isinstance(found, list) or not all(isinstance(text, str) for text in found):
-        raise ValueError(f"{name} are no texts")
-    return tuple(found)
-
-
-def _options(words: Mapping[str, Any]) -> LearnOptions:
-    reductions = words["reductions"]
-    known = {field.name for field in fields(LearnOptions)}
-    given = {name: value for name, value in words.items() if name in known}
-    given["reductions"] = None if reductions is None else Reductions(**reductions)
-    given["attach"] = tuple(given["attach"])
-    return LearnOptions(**given)
-
-
-def _plain(value: Any) -> Any:
-    """Enums as their words, tuples as lists."""
-    match value:
-        case Enum():
-            return value.value
-        case dict():
-            return {name: _plain(each) for name, each in value.items()}
-        case tuple() | list():
-            return [_plain(each) for each in value]
-        case _:
-            return value
-
-
-def _fit_words(fitted: FittedTree) -> dict[str, Any]:
-    return {
-        "history": fitted.vocabulary.history.value,
-        "differences": [
-            [difference.minuend, difference.subtrahend]
-            for difference in fitted.vocabulary.differences
-        ],
-        "max_depth": fitted.max_depth,
-        "random_state": fitted.random_state,
-        "notes": list(fitted.notes),
-    }
+def _fit(fitted: FittedTree) -> _Fit:
+    vocabulary = fitted.vocabulary
+    return _Fit(
+        vocabulary.history,
+        tuple((pair.minuend, pair.subtrahend) for pair in vocabulary.differences),
+        fitted.max_depth,
+        fitted.random_state,
+        fitted.notes,
+    )
 
 
 def _fitted(
-    words: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]], table: DemonstrationTable
+    fit: _Fit, arrays: Mapping[str, npt.NDArray[Any]], table: DemonstrationTable
 ) -> FittedTree:
-    differences = tuple(Difference(*pair) for pair in words["differences"])
-    vocabulary = Vocabulary(History(words["history"]), differences)
+    differences = tuple(Difference(*pair) for pair in fit.differences)
+    vocabulary = Vocabulary(fit.history, differences)
     asked = columns(table, vocabulary)
     grown = GrownTree(
         _of(arrays, "left", np.int64),
@@ -252,9 +255,9 @@ def _fitted(
         tuple(Action(label, table.channel) for label in table.actions),
         asked,
         vocabulary,
-        words["max_depth"],
-        int(words["random_state"]),
-        _texts(words, "notes"),
+        fit.max_depth,
+        fit.random_state,
+        fit.notes,
     )
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Final
 
+from rebt_ros.codec.form import MisfitError
+from rebt_ros.codec.hints import record
+from rebt_ros.codec.text import indented, parsed
 from rebt_ros.errors import InputError
 from rebt_ros.study.mode import Mode
-from rebt_ros.study.reduction import Size, SizeComparison
+from rebt_ros.study.reduction import SizeComparison
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,9 +136,12 @@ class ConfigurationResult:
     seconds: float
 
 
+_RESULT: Final = record(ConfigurationResult)
+
+
 def encoded(result: ConfigurationResult) -> str:
     """The result as JSON."""
-    return json.dumps(_plain(asdict(result)), ensure_ascii=False, indent=1) + "\n"
+    return indented(_RESULT.encode(result)) + "\n"
 
 
 def decoded(text: str, name: str) -> ConfigurationResult:
@@ -151,50 +155,6 @@ def decoded(text: str, name: str) -> ConfigurationResult:
         InputError: It is something else.
     """
     try:
-        return _result(json.loads(text))
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as err:
+        return _RESULT.decode(parsed(text))
+    except (MisfitError, ValueError, RecursionError) as err:
         raise InputError(f"{name} is no result of this experiment: delete it.") from err
-
-
-def _plain(value: Any) -> Any:
-    """Enums as their values, also in keys."""
-    match value:
-        case dict():
-            return {
-                key.value if isinstance(key, Mode) else key: _plain(one)
-                for key, one in value.items()
-            }
-        case list() | tuple():
-            return [_plain(one) for one in value]
-        case _:
-            return value
-
-
-def _result(value: dict[str, Any]) -> ConfigurationResult:
-    fields = dict(value)
-    fields["subtrees"] = tuple(map(_subtree, value["subtrees"]))
-    fields["modes"] = _by_mode(value["modes"], _mode)
-    fields["pairs"] = Pairs(**value["pairs"])
-    fields["networkx"] = tuple(
-        NetworkxPair(**{**one, "nodes": tuple(one["nodes"])}) for one in value["networkx"]
-    )
-    return ConfigurationResult(**fields)
-
-
-def _subtree(value: dict[str, Any]) -> SubtreeResult:
-    return SubtreeResult(**{**value, "scores": _by_mode(value["scores"], lambda one: Score(**one))})
-
-
-def _mode(value: dict[str, Any]) -> ModeResult:
-    return ModeResult(
-        tuple(LevelSizes(**one) for one in value["offered"]),
-        tuple(
-            SizeComparison(Size(**one["baseline"]), Size(**one["size"])) for one in value["sizes"]
-        ),
-        None if value["agreement"] is None else Agreement(**value["agreement"]),
-        value["mismatches"],
-    )
-
-
-def _by_mode(value: Mapping[str, Any], read: Any) -> dict[Mode, Any]:
-    return {Mode(key): read(one) for key, one in value.items()}
