@@ -18,7 +18,8 @@ from rebt_ros.storage.atomic import StorageError, write_text_atomically
 from rebt_ros.storage.bag_writer import BagStorage, new_bag
 from rebt_ros.storage.csv_writer import write_csv
 from rebt_ros.storage.text import read_text
-from rebt_ros.study.simulator.configuration import ExperimentConfig, parse_config
+from rebt_ros.study.simulator.configuration import ExperimentConfig
+from rebt_ros.study.simulator.configuration_file import parse_config
 from rebt_ros.study.simulator.synthetic_robot import (
     REPEATS,
     RUNNING_CHANCE,

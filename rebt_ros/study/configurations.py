@@ -10,7 +10,8 @@ from pathlib import Path
 
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.storage.text import read_text
-from rebt_ros.study.simulator.configuration import ExperimentConfig, parse_config
+from rebt_ros.study.simulator.configuration import ExperimentConfig
+from rebt_ros.study.simulator.configuration_file import parse_config
 
 
 @dataclass(frozen=True, slots=True)

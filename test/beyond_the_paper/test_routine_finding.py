@@ -39,8 +39,8 @@ from rebt_ros.study.simulator.configuration import (
     Inverted,
     SimulatedNode,
     as_behavior_tree,
-    parse_config,
 )
+from rebt_ros.study.simulator.configuration_file import parse_config
 from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, simulate
 from rebt_ros.study.subtree_text import one_line
 

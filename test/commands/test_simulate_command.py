@@ -20,15 +20,8 @@ from rebt_ros.demonstration.table import tabulate
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.offline import learning_from_files as offline
 from rebt_ros.storage.inputs import load
-from rebt_ros.study.simulator.configuration import (
-    Act,
-    Check,
-    Group,
-    GroupKind,
-    Inverted,
-    parse_config,
-)
-from rebt_ros.study.simulator.configuration_file import format_config
+from rebt_ros.study.simulator.configuration import Act, Check, Group, GroupKind, Inverted
+from rebt_ros.study.simulator.configuration_file import format_config, parse_config
 from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, SimulatedRun, simulate
 
 SEQUENCE, SELECTOR, PARALLEL = GroupKind.SEQUENCE, GroupKind.SELECTOR, GroupKind.PARALLEL
@@ -191,10 +184,10 @@ def test_nodes_without_meaning_are_skipped_with_a_warning_each(
     (tmp_path / "tree.json").write_text(json.dumps(value))
     run(tmp_path / "tree.json", "--ticks", "20", "--out", tmp_path)
     assert capsys.readouterr().err == (
-        "warning: tree: child 3 of the root has type DEFAULT and is skipped.\n"
+        "warning: tree: the root.child_list[2] has type DEFAULT and is skipped.\n"
     )
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
-    assert summary["notes"] == ["tree: child 3 of the root has type DEFAULT and is skipped"]
+    assert summary["notes"] == ["tree: the root.child_list[2] has type DEFAULT and is skipped"]
 
 
 def test_a_configuration_without_conditions_gets_a_state_that_no_node_reads(

@@ -17,15 +17,8 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.offline import learning_from_files as offline
 from rebt_ros.storage.inputs import load
-from rebt_ros.study.simulator.configuration import (
-    Act,
-    Check,
-    Group,
-    GroupKind,
-    Inverted,
-    parse_config,
-)
-from rebt_ros.study.simulator.configuration_file import format_config
+from rebt_ros.study.simulator.configuration import Act, Check, Group, GroupKind, Inverted
+from rebt_ros.study.simulator.configuration_file import format_config, parse_config
 from rebt_ros.study.simulator.synthetic_robot import ExperimentRobot, SimulatedRun, simulate
 
 #: Several actions in a tick, repeats, and actions that fail.
@@ -161,7 +154,7 @@ def test_nodes_without_meaning_are_skipped_with_a_warning(
     value["child_list"].append({"name": "DEFAULT", "type_": "DEFAULT"})
     config.write_text(json.dumps(value))
     with NodeProcess("synthetic_robot_node", domain, tmp_path, {"config": config}) as robot:
-        robot.says("tree: child 3 of the root has type DEFAULT and is skipped.")
+        robot.says("tree: the root.child_list[2] has type DEFAULT and is skipped.")
 
 
 @pytest.mark.parametrize(

@@ -12,15 +12,14 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.errors import InputError
 from rebt_ros.logic.conditions import Literal, Threshold
 from rebt_ros.study.simulator.configuration import (
-    DEEPEST_CONFIGURATION,
     Act,
     Check,
     Group,
     GroupKind,
     Inverted,
     as_behavior_tree,
-    parse_config,
 )
+from rebt_ros.study.simulator.configuration_file import DEEPEST_CONFIGURATION, parse_config
 
 EXPERIMENTS = Path(__file__).resolve().parents[3] / "shared" / "experiments"
 needs_experiments = pytest.mark.skipif(
@@ -81,8 +80,8 @@ def test_nodes_of_type_default_are_skipped_with_a_note_each() -> None:
     config = parse_config(json.dumps(root), "it")
     assert config.root.children == (Group(GroupKind.PARALLEL_SELECTOR, (Act("a"),)),)
     assert config.notes == (
-        "it: child 1 of the root has type DEFAULT and is skipped",
-        "it: child 2 of child 2 of the root has type DEFAULT and is skipped",
+        "it: the root.child_list[0] has type DEFAULT and is skipped",
+        "it: the root.child_list[1].child_list[1] has type DEFAULT and is skipped",
     )
 
 
@@ -91,7 +90,7 @@ def test_a_group_in_which_nothing_is_left_is_skipped_with_a_note() -> None:
         json.dumps(group("sequence", group("parsel", LEFT_OVER), action("a"))), "it"
     )
     assert config.root.children == (Act("a"),)
-    assert config.notes[1] == "it: child 1 of the root is a parsel of nothing and is skipped"
+    assert config.notes[1] == "it: the root.child_list[0] is a parsel of nothing and is skipped"
 
 
 def test_the_behavior_tree_has_the_same_shape() -> None:
@@ -124,27 +123,32 @@ def test_a_tree_may_be_as_deep_as_the_limit() -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ([], "it: the root must be an object."),
+        ([], "it: the root must be an object, not []."),
         (action("a"), "it: the root must be a group of nodes that mean something."),
         (LEFT_OVER, "it: the root must be a group of nodes that mean something."),
         (group("dance", action("a")), "it: the root has the unknown type 'dance'."),
         ({"type_": "sequence"}, "it: the root is a sequence without a child_list."),
-        (group("sequence", {"type_": 3}), "it: child 1 of the root needs a text as type_."),
+        (
+            group("sequence", {"type_": 3}),
+            "it: the root.child_list[0].type_ must be a text, not 3.",
+        ),
         (
             group("sequence", action("a", colour="red")),
-            "it: child 1 of the root has the unknown field 'colour'.",
+            "it: the root.child_list[0] has the unknown field 'colour'.",
         ),
         (
             group("sequence", action("a\x1b[2J")),
-            "it: child 1 of the root has the name 'a\\x1b[2J': write it with printable characters.",
+            "it: the root.child_list[0] has the name 'a\\x1b[2J': "
+            "write it with printable characters.",
         ),
         (
             group("sequence", condition(" ")),
-            "it: child 1 of the root has the target_state ' ': write it with printable characters.",
+            "it: the root.child_list[0] has the target_state ' ': "
+            "write it with printable characters.",
         ),
         (
             group("sequence", action("a", p_success=1.5)),
-            "it: child 1 of the root has p_success 1.5, which must be from 0 to 1.",
+            "it: the root.child_list[0].p_success must be a number from 0 to 1, not 1.5.",
         ),
         (
             group("sequence", action("a"), p_success=0.5),
@@ -152,19 +156,20 @@ def test_a_tree_may_be_as_deep_as_the_limit() -> None:
         ),
         (
             group("sequence", condition("/x", threshold=True)),
-            "it: child 1 of the root needs a number as threshold.",
+            "it: the root.child_list[0].threshold must be a number, not True.",
         ),
         (
             group("sequence", condition("/x", threshold=float("nan"))),
-            "it: child 1 of the root needs a finite number as threshold.",
+            "it is not JSON: NaN is not a number.",
         ),
         (
             group("sequence", condition("/x", threshold=10**400)),
-            "it: child 1 of the root needs a finite number as threshold.",
+            "it: the root.child_list[0].threshold must be a number from -1e+300 to 1e+300, not "
+            "100000000000000000...0000000000000000000.",
         ),
         (
             group("sequence", action("a", inverted="no")),
-            "it: child 1 of the root has inverted 'no', which must be true or false.",
+            "it: the root.child_list[0].inverted must be true or false, not 'no'.",
         ),
     ],
 )

@@ -20,9 +20,8 @@ from rebt_ros.study.simulator.configuration import (
     Inverted,
     SimulatedNode,
     leaves,
-    parse_config,
 )
-from rebt_ros.study.simulator.configuration_file import format_config
+from rebt_ros.study.simulator.configuration_file import format_config, parse_config
 from rebt_ros.study.simulator.generator import canonical_form, generate_configs
 
 EXPERIMENTS = Path(__file__).resolve().parents[3] / "shared" / "experiments"

@@ -22,8 +22,8 @@ from rebt_ros.study.simulator.configuration import (
     GroupKind,
     Inverted,
     SimulatedNode,
-    parse_config,
 )
+from rebt_ros.study.simulator.configuration_file import parse_config
 from rebt_ros.study.simulator.py_trees_form import py_trees_form
 from rebt_ros.study.simulator.synthetic_robot import (
     TICK_PERIOD,

@@ -19,7 +19,7 @@ from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
 from rebt_ros.ros.graph_watch import GraphWatch
 from rebt_ros.ros.parameters import Parameters, at_home
 from rebt_ros.storage.text import read_text
-from rebt_ros.study.simulator.configuration import parse_config
+from rebt_ros.study.simulator.configuration_file import parse_config
 from rebt_ros.study.simulator.synthetic_robot import (
     REPEATS,
     RUNNING_CHANCE,
