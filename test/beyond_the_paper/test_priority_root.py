@@ -55,3 +55,10 @@ def test_priority_is_for_selectors_alone(table: DemonstrationTable) -> None:
     assert reduced_tree(rules, ALL_REDUCTIONS, Root.PARALLEL) == reduced_tree(
         rules, without, Root.PARALLEL
     )
+
+
+def test_infeasible_combinations_are_dont_cares_in_trees_of_up_to_40_leaves() -> None:
+    assert ALL_REDUCTIONS.made_in(40).domain
+    assert not ALL_REDUCTIONS.made_in(41).domain
+    assert replace(ALL_REDUCTIONS.made_in(41), domain=True) == ALL_REDUCTIONS
+    assert not NONE.made_in(40).domain

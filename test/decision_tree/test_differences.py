@@ -137,3 +137,15 @@ def test_whatever_was_shown_the_only_difference_is_offered_or_none(
     found = likely_differences(shown, plain)
     assert found in ((), (some.DIFFERENCE,))
     assert likely_differences(shown, plain) == found
+
+
+@pytest.mark.parametrize(
+    ("largest", "offered"), [(LARGEST_VALUE / 2, True), (LARGEST_VALUE, False)]
+)
+def test_a_feature_is_subtracted_only_where_no_difference_can_overflow(
+    largest: float, offered: bool
+) -> None:
+    shown = table()
+    # A single row, which does not change how far the rows are spread.
+    shown.states[0, 0] = largest
+    assert (SIDES in likely_differences(shown, FEATURES_ALONE)) is offered

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary, encode
+from rebt_ros.decision_tree.grown import GrownTree
+from rebt_ros.decision_tree.pruning import pruning_path
 from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature
@@ -101,3 +103,17 @@ def test_a_tree_without_splits_has_one_level(rows: int) -> None:
     table = noisy_table(3, rows)
     same = table.where(table.chosen == table.chosen[0])
     assert fit(same).path.alphas.tolist() == [0.0]
+
+
+def test_alpha_0_prunes_nothing_not_even_a_split_that_gains_nothing() -> None:
+    idle = GrownTree(
+        left=np.array([1, -1, -1]),
+        right=np.array([2, -1, -1]),
+        column=np.array([0, -1, -1]),
+        threshold=np.array([0.5, 0.0, 0.0]),
+        counts=np.array([[2, 2], [1, 1], [1, 1]]),
+        risk=np.array([0.5, 0.25, 0.25]),
+    )
+    path = pruning_path(idle)
+    assert path.leaves_at(0.0).tolist() == [False, True, True]
+    assert path.leaves_at(1e-9).tolist() == [True, True, True]
