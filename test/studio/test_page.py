@@ -8,6 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+pytest.importorskip("aiohttp")
+pytest.importorskip("selenium")
+
 from chromium import Browser
 from pretend_robot import (
     DOCUMENT,
@@ -39,8 +43,6 @@ from rebt_ros.studio.tree_view import published_view
 SECTIONS = ("live", "teach", "learn", "curate", "explain")
 #: What would show that a label was taken for markup.
 MARKUP = "<img src=x onerror=\"document.title='taken'\"><script>1</script>&amp;"
-
-pytest.importorskip("aiohttp")
 
 
 @pytest.fixture
