@@ -60,6 +60,7 @@ _ASKED = (
     "history",
     "differences",
     "reaction_time",
+    "leave_out_mistakes",
     "readable_thresholds",
     "simplest",
     "refit",
@@ -281,6 +282,13 @@ def _add_form(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         default=None,
         help="leave thresholds halfway between two rows, not at round values that they share",
+    )
+    form.add_argument(
+        "--keep-mistakes",
+        dest="leave_out_mistakes",
+        action="store_false",
+        default=None,
+        help="learn from rows that look like mistakes, too",
     )
     form.add_argument(
         "--no-routines",

@@ -101,13 +101,30 @@ class FittedTree:
         Exceptions are the rows that a tree gets wrong.  Of all ways to prune this one it is the
         least number, so that what demonstrators do by mistake counts as that.
         """
+        return self._explaining()[0]
+
+    def explained(self, table: DemonstrationTable) -> IntArray:
+        """What the tree of the explanation chooses in each row of a table, shape (rows,).
+
+        Of equally small explanations it is the one with the fewest leaves.
+        """
+        standing = self.path.standing(self._explaining()[1])
+        return np.asarray(
+            self.grown.majority[standing[_reached(self.grown, table, self.vocabulary)]]
+        )
+
+    def _explaining(self) -> tuple[int, BoolArray]:
+        """The size of the explanation, and which nodes are its leaves, or would be if reached."""
         grown, sizes = self.grown, self._sizes().tolist()
         left, other = grown.left.tolist(), grown.right.tolist()
+        is_leaf = grown.left < 0
         # Children come after their parents.
         for node in range(len(grown) - 1, -1, -1):
             if left[node] >= 0:
-                sizes[node] = min(sizes[node], sizes[left[node]] + sizes[other[node]])
-        return int(sizes[0])
+                parted = sizes[left[node]] + sizes[other[node]]
+                is_leaf[node] = sizes[node] <= parted
+                sizes[node] = min(sizes[node], parted)
+        return int(sizes[0]), is_leaf
 
     @property
     def explanations(self) -> IntArray:

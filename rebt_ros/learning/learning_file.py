@@ -133,7 +133,7 @@ def saved(learning: Learning) -> Saved | None:
     if table.states.size > MOST_VALUES:
         return None
     arrays = {f"table.{name}": getattr(table, name) for name in _TABLE}
-    arrays["held_out"] = evidence.held_out
+    arrays |= {"held_out": evidence.held_out, "intended": evidence.intended}
     if table.before is not None:
         arrays["table.before"] = table.before
     for role, fitted in (("fitted", evidence.fitted), ("judge", evidence.judge)):
@@ -198,11 +198,14 @@ def _restored(words: _Words, arrays: Mapping[str, npt.NDArray[Any]]) -> Learning
     held_out = _of(arrays, "held_out", np.bool_)
     if held_out.shape != (len(table),):
         raise ValueError("rows held out are not those of the table")
+    intended = _of(arrays, "intended", np.int64)
+    if intended.shape != (len(table),) or not _within(intended, 0, len(table.actions)):
+        raise ValueError("intended actions are not those of the table")
     fitted, judge = (
         _fitted(fit, {name: arrays[f"{role}.{name}"] for name in _TREE}, table)
         for role, fit in (("fitted", words.fitted), ("judge", words.judge))
     )
-    evidence = Evidence(table, held_out, fitted, judge, words.psa, words.options)
+    evidence = Evidence(table, held_out, intended, fitted, judge, words.psa, words.options)
     levels = None
     if "levels.hits" in arrays:
         levels = JudgedLevels(

@@ -24,6 +24,7 @@ from rebt_ros.learning import evaluation
 from rebt_ros.learning.attaching import accept
 from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.conversion import convert, own_history_choices
+from rebt_ros.learning.mistakes import without_mistakes
 from rebt_ros.learning.options import LearnOptions
 from rebt_ros.robot_file.robot_file import RobotFile
 
@@ -47,6 +48,8 @@ class Evidence:
     """All rows, lagged features included, late actions moved back."""
     held_out: BoolArray
     """Rows that the tree was judged on, shape (rows,)."""
+    intended: IntArray
+    """What was meant in each row, shape (rows,): what was done, but for mistakes."""
     fitted: FittedTree
     """Fitted to the rows that the published tree is learned from."""
     judge: FittedTree
@@ -57,8 +60,11 @@ class Evidence:
 
     @property
     def learned_from(self) -> DemonstrationTable:
-        """The rows that the published tree is learned from."""
-        return self.table if self.options.refit else self.table.where(~self.held_out)
+        """The rows that the published tree is learned from, without mistakes."""
+        if self.options.refit:
+            return without_mistakes(self.table, self.intended)
+        known = ~self.held_out
+        return without_mistakes(self.table.where(known), self.intended[known])
 
     def decision_tree_at(self, ccp_alpha: float) -> TrainedTree:
         """The decision tree of a pruning level, with thresholds as the options say."""

@@ -86,6 +86,9 @@ class LearnOptions:
     readable_thresholds: bool = True
     """Whether thresholds are moved to round values that splits share, within the gaps between the
     rows that were shown."""
+    leave_out_mistakes: bool = True
+    """Whether rows that look like mistakes are left out of what is learned from, and out of what
+    was done before other rows: of at most 5000 samples."""
     reaction_time: float | None = None
     """How late the demonstrator acted (seconds), to be undone before learning; None to read it off
     the demonstrations if their rows are samples, and otherwise 0."""
@@ -200,6 +203,7 @@ class LearnOptions:
             refit=False,
             simplest=False,
             readable_thresholds=False,
+            leave_out_mistakes=False,
             reaction_time=0.0,
             routines=False,
         )
@@ -217,7 +221,7 @@ _ENUMS: Mapping[str, type[Enum]] = {
 #: Options that are numbers, and those that say yes or no.
 _NUMBERS = ("delta", "ccp_alpha", "test_fraction", "reaction_time")
 _WHOLE_NUMBERS = ("max_depth", "level", "random_state", "lags")
-_SWITCHES = ("refit", "simplest", "readable_thresholds", "routines")
+_SWITCHES = ("refit", "simplest", "readable_thresholds", "leave_out_mistakes", "routines")
 #: Numbers that may be None.
 _LEFT_OPEN = frozenset({"ccp_alpha", "reaction_time", "max_depth", "level"})
 #: Those that are None where nobody chose.

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray
+from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import (
     ChannelProvenance,
@@ -29,6 +29,7 @@ from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.late_actions import shifted
 from rebt_ros.learning.learning import Learning, learned_as_asked
 from rebt_ros.learning.levels import Evidence
+from rebt_ros.learning.mistakes import intended_actions, without_mistakes
 from rebt_ros.learning.options import ALL, DEFAULTS, LearnOptions
 from rebt_ros.learning.progress import Progress
 from rebt_ros.learning.reaction_time import ReactionTime, estimate, given
@@ -195,8 +196,11 @@ def learn_from(
     # Before any rows are set apart, so that each still knows those before it.
     table = with_lags(table, options.lags)
     held_out = table.held_out(options.test_fraction)
-    judged, policy = _chosen(table, held_out, options, progress)
-    evidence = Evidence(table, held_out, policy.fitted, judged.fitted, policy.psa, options)
+    intended = _intended(table, held_out, options)
+    judged, policy = _chosen(table, held_out, intended, options, progress)
+    evidence = Evidence(
+        table, held_out, intended[-1], policy.fitted, judged.fitted, policy.psa, options
+    )
     ccp_alpha = judged.ccp_alpha if options.level is None else policy.ccp_alpha
     plain = evidence.tree_at(policy.ccp_alpha, judged_at=ccp_alpha)
     progress("suggesting", 0.9)
@@ -212,14 +216,39 @@ def learn_from(
         policy,
         evidence,
         late=(late.sentence,) if late.rows else (),
-        further=(*trained.notes, *notes, *_cautions(table, trained, options)),
+        further=(
+            *_mistakes(table, evidence.intended),
+            *trained.notes,
+            *notes,
+            *_cautions(table, trained, options),
+        ),
     )
     progress("done", 1.0)
     return learning
 
 
+def _intended(
+    table: DemonstrationTable, held_out: BoolArray, options: LearnOptions
+) -> tuple[IntArray, IntArray]:
+    """What was meant in each row, as far as rows that are not held out tell, and as all do.
+
+    Without `refit` nobody asks for the latter: both are the former.
+    """
+    if not options.leave_out_mistakes:
+        return table.chosen, table.chosen
+    known = table.chosen.copy()
+    # Of few rows each one counts, so that all of them take part or none.
+    if len(table) <= _CHOSEN_FROM_ALL:
+        known[~held_out] = intended_actions(table.where(~held_out))
+    return known, (intended_actions(table) if options.refit else known)
+
+
 def _chosen(
-    table: DemonstrationTable, held_out: BoolArray, options: LearnOptions, progress: Progress
+    table: DemonstrationTable,
+    held_out: BoolArray,
+    intended: tuple[IntArray, IntArray],
+    options: LearnOptions,
+    progress: Progress,
 ) -> tuple[ChosenPolicy, ChosenPolicy]:
     """The policy to judge, which knows nothing of the rows held out, and the one to publish."""
     progress("choosing", _CHOOSING)
@@ -234,12 +263,15 @@ def _chosen(
         judged = choose(table, options, advance, held_out)
     else:
         kept = replace(options, level=None) if again else options
-        judged = choose(table.where(~held_out), kept, advance)
+        known = without_mistakes(table.where(~held_out), intended[0][~held_out])
+        judged = choose(known, kept, advance)
     progress("judging", _JUDGING)
     if not options.refit:
         return judged, judged
     progress("learning from all rows", _JUDGING)
-    return judged, choose(table, options) if again else _of_all(judged, options)
+    if not again:
+        return judged, _of_all(judged, options)
+    return judged, choose(without_mistakes(table, intended[1]), options)
 
 
 def reaction_time_of(table: DemonstrationTable, options: LearnOptions) -> ReactionTime:
@@ -268,6 +300,18 @@ def _of_all(policy: ChosenPolicy, options: LearnOptions) -> ChosenPolicy:
         # The levels of another fit lie elsewhere: what was chosen is the range up to the next one.
         ccp_alpha = policy.fitted.path.middle(ccp_alpha)
     return replace(policy, fitted=policy.of_all, ccp_alpha=ccp_alpha)
+
+
+def _mistakes(table: DemonstrationTable, intended: IntArray) -> Iterator[str]:
+    """Which rows are left out as mistakes."""
+    mistaken = table.chosen[intended != table.chosen]
+    counts = np.bincount(mistaken, minlength=len(table.actions)).tolist()
+    each = (f"{table.actions[code]!r} {count} times" for code, count in enumerate(counts) if count)
+    if len(mistaken):
+        yield (
+            f"{len(mistaken)} of {len(table)} rows look like mistakes and are left out: "
+            f"{', '.join(each)}"
+        )
 
 
 def _cautions(

@@ -247,6 +247,12 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
             "Whether the simplest of the trees that fit the rows is searched for, up to 30 leaves.",
             fixed=False,
         ),
+        "leave_out_mistakes": declare.flag(
+            "leave_out_mistakes",
+            True,
+            "Whether rows that look like mistakes are left out of what is learned from.",
+            fixed=False,
+        ),
         "readable_thresholds": declare.flag(
             "readable_thresholds",
             True,
