@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench bench-driving bench-recorder experiment fuzz soak lint format clean
+.PHONY: help setup build demo studio test bench bench-driving bench-recorder experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -42,6 +42,10 @@ build: setup ## Build into install/; then: source install/setup.bash
 demo: export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 demo: build ## Demonstrate, learn and let the learned tree drive a simulated robot (ARGS="..." for options).
 	@. install/local_setup.sh && exec install/rebt_ros/lib/rebt_ros/demo $(ARGS)
+
+studio: export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+studio: build ## Show a simulated robot its task, and go on in the studio: learn, edit and drive in a browser.
+	@. install/local_setup.sh && exec install/rebt_ros/lib/rebt_ros/demo --studio $(ARGS)
 
 # PYTHONSAFEPATH keeps the checkout off Python's path: the tests import what was installed.
 # Two tests run at a time, as they mostly wait for other processes: files stay together.  A worker

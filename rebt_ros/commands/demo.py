@@ -10,8 +10,10 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -20,7 +22,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import rclpy
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
@@ -47,11 +49,16 @@ from rebt_ros.storage.atomic import write_text_atomically
 _FRESH_STARTS = 100_000
 #: Simulated seconds per second.
 _SPEEDUP = 20.0
+_WATCHED_SPEEDUP = 4.0
+#: What the studio says when its page can be opened.
+_PAGE = re.compile(r"open (http://\S+) in a browser")
 #: Says where features and actions are in the robot's messages, and what labels do.
 _ROBOT_FILE = "demo_robot.yaml"
 #: Ticks of the executor per simulated second.
 _RATE = 20.0
 _START_TIMEOUT, _RUN_TIMEOUT, _LEARN_TIMEOUT, _STOP_TIMEOUT = 30.0, 60.0, 120.0, 5.0
+
+T = TypeVar("T")
 
 
 class DemoError(RebtError):
@@ -67,6 +74,13 @@ class Plan:
     out: Path
     plain: bool
     """Whether everybody speaks arrays and words, and not the messages of real robots."""
+    studio: bool
+    """Whether a person goes on in the studio once the task was shown."""
+
+    @property
+    def speedup(self) -> float:
+        """Simulated seconds per second: a person wants to see what happens."""
+        return _WATCHED_SPEEDUP if self.studio else _SPEEDUP
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -87,9 +101,20 @@ def main(arguments: list[str] | None = None) -> None:
         action="store_true",
         help="speak Float64MultiArray and String, instead of standard messages and a robot file",
     )
+    parser.add_argument(
+        "--studio",
+        action="store_true",
+        help="go on in the studio once the task was shown, until Ctrl-C; the robot is --plain then",
+    )
     parsed = parse(parser, arguments)
     folder = parsed.out / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
-    plan = Plan(parsed.demonstrations, parsed.trials, folder.resolve(), parsed.plain)
+    plan = Plan(
+        parsed.demonstrations,
+        parsed.trials,
+        folder.resolve(),
+        parsed.plain or parsed.studio,
+        parsed.studio,
+    )
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _interrupt)
     run(lambda: _demonstrate(plan), "demo")
@@ -109,6 +134,9 @@ def _demonstrate(plan: Plan) -> None:
     with _processes(plan) as processes, _person(processes) as person:
         print("Starting robot, demonstrator, recorder, learner and executor …")
         person.wait_for_nodes()
+        if plan.studio:
+            _go_on_in_the_studio(plan, person)
+            return
         shown = person.drive("demonstrator", plan.demonstrations, 0, "Showing", record=True)
         print("Learning …")
         sentence = person.learn()
@@ -121,18 +149,36 @@ def _demonstrate(plan: Plan) -> None:
     _report(plan, document, shown, taught, learned, time.monotonic() - started)
 
 
+def _go_on_in_the_studio(plan: Plan, person: Person) -> None:
+    """Shows the task, and leaves the rest to a person with a browser."""
+    person.drive("demonstrator", plan.demonstrations, 0, "Showing", record=True)
+    log = plan.out / "logs" / "studio.log"
+    urls = person.wait(lambda: _PAGE.findall(log.read_text()), _START_TIMEOUT, "the studio's page")
+    print(f"Open {urls[0]} in a browser: learn there, and let the tree drive.  Ctrl-C ends it all.")
+    with contextlib.suppress(KeyboardInterrupt):
+        person.wait(lambda: False, math.inf, "")
+    print(f"Ended; recordings, trees and logs are in {plan.out}")
+
+
 @contextlib.contextmanager
 def _processes(plan: Plan) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
-    """The five nodes as processes, none of which outlives the block."""
+    """The nodes as processes, none of which outlives the block."""
     robot_file = {} if plan.plain else {"robot_file": _shared_files() / "config" / _ROBOT_FILE}
     shown = plan.out / "demonstrations"
     commands: dict[str, dict[str, Any]] = {
-        "robot": {"speedup": _SPEEDUP, "rate": _RATE, "lockstep": True, "plain": plan.plain},
+        "robot": {
+            "speedup": plan.speedup,
+            "rate": _RATE,
+            "lockstep": not plan.studio,
+            "plain": plan.plain,
+        },
         "demonstrator": {"enabled": False, "plain": plan.plain},
         "recorder": {"demonstrations": shown, "recording": False, **robot_file},
         "learner": {"demonstrations": shown, "output": plan.out / "learned"},
-        "executor": {"rate": _RATE * _SPEEDUP, **robot_file},
+        "executor": {"rate": _RATE * plan.speedup, **robot_file},
     }
+    if plan.studio:
+        commands["studio"] = {"demonstrations": shown, "output": plan.out / "learned"}
     running: dict[str, subprocess.Popen[bytes]] = {}
     try:
         for name, parameters in commands.items():
@@ -224,7 +270,7 @@ class Person(Node):
     def wait_for_nodes(self) -> None:
         """Waits until all services can be called."""
         for name, client in self._at_hand.items():
-            self._wait(client.service_is_ready, _START_TIMEOUT, f"service {name} to appear")
+            self.wait(client.service_is_ready, _START_TIMEOUT, f"service {name} to appear")
 
     def drive(
         self, driver: str, runs: int, first_start: int, what: str, *, record: bool = False
@@ -239,12 +285,12 @@ class Person(Node):
         self._call("robot/set_parameters", SetParameters.Request(parameters=setting))
         self._call("robot/reset", Trigger.Request())
         if record:
-            self._wait(lambda: self._ready, _START_TIMEOUT, "the recorder to hear all topics")
+            self.wait(lambda: self._ready, _START_TIMEOUT, "the recorder to hear all topics")
             self._call("recorder/record", SetBool.Request(data=True))
         before = len(self._runs)
         for done in range(runs):
             self._call(f"{driver}/enable", SetBool.Request(data=True))
-            self._wait(
+            self.wait(
                 lambda done=done: len(self._runs) > before + done,  # type: ignore[misc]
                 _RUN_TIMEOUT,
                 f"run {done + 1} of the {driver} to end",
@@ -267,7 +313,7 @@ class Person(Node):
         answer = self._call("learner/relearn", Trigger.Request(), _LEARN_TIMEOUT)
         if not answer.success:
             raise DemoError(f"the learner refused: {answer.message}")
-        self._wait(lambda: bool(self.document), _START_TIMEOUT, "the learned tree")
+        self.wait(lambda: bool(self.document), _START_TIMEOUT, "the learned tree")
         return str(answer.message)
 
     def _on_episode(self, message: String) -> None:
@@ -281,18 +327,24 @@ class Person(Node):
 
     def _call(self, service: str, request: Any, timeout: float = _START_TIMEOUT) -> Any:
         future = self._at_hand[service].call_async(request)
-        self._wait(future.done, timeout, f"an answer of service {service}")
+        self.wait(future.done, timeout, f"an answer of service {service}")
         return future.result()
 
-    def _wait(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+    def wait(self, condition: Callable[[], T], timeout: float, what: str) -> T:
+        """Waits until a condition holds; returns what it gave.
+
+        Raises:
+            DemoError: It did not hold in time, or a node has ended.
+        """
         deadline = time.monotonic() + timeout
-        while not condition():
+        while not (found := condition()):
             rclpy.spin_once(self, timeout_sec=0.05)
             for name, process in self._processes.items():
                 if process.poll() is not None:
                     raise DemoError(f"the {name} has ended by itself: see logs/{name}.log.")
             if time.monotonic() > deadline:
                 raise DemoError(f"waited {timeout:.0f} s in vain for {what}: see the logs.")
+        return found
 
 
 def _show_progress(what: str, runs: Sequence[dict[str, Any]], total: int) -> None:
