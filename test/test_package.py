@@ -126,7 +126,7 @@ def test_the_tests_run_on_the_installed_package_and_it_is_complete() -> None:
     shipped = sorted(
         path.relative_to(CHECKOUT)
         for path in (CHECKOUT / PACKAGE).rglob("*")
-        if path.suffix in {".py", ".json"} or path.name == "py.typed"
+        if path.suffix in {".py", ".json", ".html", ".css", ".js"} or path.name == "py.typed"
     )
     assert [path for path in shipped if not (INSTALLED.parent / path).is_file()] == []
     assert [

@@ -15,6 +15,7 @@ import os
 import random
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -50,6 +51,7 @@ _FRESH_STARTS = 100_000
 #: Simulated seconds per second.
 _SPEEDUP = 20.0
 _WATCHED_SPEEDUP = 4.0
+_USUAL_PORT = 8970
 #: What the studio says when its page can be opened.
 _PAGE = re.compile(r"open (http://\S+) in a browser")
 #: Says where features and actions are in the robot's messages, and what labels do.
@@ -178,7 +180,11 @@ def _processes(plan: Plan) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
         "executor": {"rate": _RATE * plan.speedup, **robot_file},
     }
     if plan.studio:
-        commands["studio"] = {"demonstrations": shown, "output": plan.out / "learned"}
+        commands["studio"] = {
+            "demonstrations": shown,
+            "output": plan.out / "learned",
+            "port": _free_port(),
+        }
     running: dict[str, subprocess.Popen[bytes]] = {}
     try:
         for name, parameters in commands.items():
@@ -189,6 +195,16 @@ def _processes(plan: Plan) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
         yield running
     finally:
         _stop(list(running.values()))
+
+
+def _free_port() -> int:
+    """The studio's usual port; 0, for any other, where somebody has it."""
+    with contextlib.closing(socket.socket()) as probe:
+        try:
+            probe.bind(("127.0.0.1", _USUAL_PORT))
+        except OSError:
+            return 0
+    return _USUAL_PORT
 
 
 def _prefix() -> Path:
