@@ -24,9 +24,9 @@ from rebt_ros.demonstration.fields import names_of, values_of
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
 from rebt_ros.live.arrival import LAST, ArrivalOrder
-from rebt_ros.live.losses import Losses
 from rebt_ros.live.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
 from rebt_ros.live.state_streams import StateStreams
+from rebt_ros.live.traffic import Traffic
 from rebt_ros.robot_file.binding import BoundTopic
 from rebt_ros.robot_file.features import FeatureReader, described
 from rebt_ros.ros import lifetime
@@ -54,9 +54,6 @@ _TIMELESS: Final = "action before the first /clock"
 
 #: Time between two looks at who publishes (seconds).
 _LOOK_PERIOD: Final = 0.5
-
-#: A state topic is silent after this long without a message (seconds).
-_SILENT: Final = 2.0
 
 
 class _Fetched(CallbackGroup):
@@ -107,13 +104,9 @@ class RecorderNode(Node):
         self._streams = StateStreams(
             (topic.name for topic in settings.state_topics), settings.state_wait
         )
-        self._received = dict.fromkeys((topic.name for topic in settings.state_topics), 0)
-        self._messages = 0
-        self._lost = 0
-        self._losses = Losses(settings.sources)
+        states = [topic.name for topic in settings.state_topics]
+        self._traffic = Traffic(states, settings.sources, time.monotonic())
         self._reliable = settings.action_topics if settings.best_effort else settings.sources
-        self._heard: dict[str, float] = {}
-        self._reported = time.monotonic()
         self._immediate = settings.reorder_window == 0
         self._robot: RobotTopics | None = None
         self._readers: dict[str, FeatureReader] = {}
@@ -304,16 +297,14 @@ class RecorderNode(Node):
                 self._queue_action(channel, label, sent, info)
         if reader is None:
             return
-        self._received[topic] += 1
-        self._heard[topic] = time.monotonic()
+        self._traffic.state(topic, time.monotonic())
         if sent is not None:
             self._streams.take(topic, sent, time.monotonic_ns())
         values, stamp = reader.read(message, place), self._stamp(place)
         self._queue(place, partial(self._session.observe, stamp, topic, values, (), sent))
 
     def _on_state(self, topic: str, message: Float64MultiArray, info: dict[str, Any]) -> None:
-        self._received[topic] += 1
-        self._heard[topic] = time.monotonic()
+        self._traffic.state(topic, time.monotonic())
         self._note(topic, info)
         sent = self._sending.of(info)
         if sent is not None:
@@ -353,8 +344,7 @@ class RecorderNode(Node):
 
     def _note(self, topic: str, info: dict[str, Any]) -> None:
         """Counts a message."""
-        self._messages += 1
-        self._losses.take(topic, info.get("publication_sequence_number"))
+        self._traffic.message(topic, info.get("publication_sequence_number"))
 
     def _place(self, info: dict[str, Any]) -> int:
         """Where a message belongs among the others, nanoseconds."""
@@ -386,7 +376,7 @@ class RecorderNode(Node):
         unheard = [
             name
             for name in self._settings.sources
-            if name not in (self._heard if name in states else connected)
+            if not (self._traffic.heard(name) if name in states else name in connected)
         ]
         return [*unheard, "/clock"] if simulated_time(self) == 0 else unheard
 
@@ -461,8 +451,7 @@ class RecorderNode(Node):
         return place if simulated is None else simulated
 
     def _count_losses(self) -> None:
-        for topic, count in self._losses.settle(self.count_publishers).items():
-            self._lost += count
+        for topic, count in self._traffic.newly_lost(self.count_publishers).items():
             if count and topic in self._reliable:
                 self._faults.note(
                     "message lost",
@@ -472,7 +461,6 @@ class RecorderNode(Node):
 
     def _report(self) -> Report:
         now = time.monotonic()
-        elapsed, self._reported = now - self._reported, now
         session = self._session
         self._count_losses()
         values: dict[str, object] = {
@@ -480,19 +468,18 @@ class RecorderNode(Node):
             "rows lost": session.lost,
             "takeovers": session.takeovers,
             "failed episodes": session.failed,
-            "messages": self._messages,
-            "messages lost": self._lost,
+            "messages": self._traffic.messages,
+            "messages lost": self._traffic.lost,
             "actions that wait for their state": self._order.held,
             "paired by": "sent" if self._sending.comparable else "received",
             "demonstration": session.writer.path if session.writer else "none yet",
             "rows of the demonstration": session.writer.rows if session.writer else 0,
             "origin of the demonstration": session.origin.value,
         }
-        for topic, count in self._received.items():
-            values[f"rate of {topic} (Hz)"] = f"{count / elapsed:.1f}" if elapsed else "unknown"
-            self._received[topic] = 0
+        for topic, rate in self._traffic.rates(now).items():
+            values[f"rate of {topic} (Hz)"] = "unknown" if rate is None else f"{rate:.1f}"
         values |= self._faults.counts
-        silent = [topic for topic in self._received if now - self._heard.get(topic, 0.0) > _SILENT]
+        silent = self._traffic.silent(now)
         if session.failure:
             return Report(Level.ERROR, session.failure, values)
         problems = self._problems()
