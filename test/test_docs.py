@@ -71,3 +71,10 @@ def test_the_page_on_learning_names_the_limits() -> None:
         assert f" {limit} leaves" in page
     assert suggesting._MOST_SUGGESTIONS == 12
     assert "at most twelve suggestions" in page
+
+
+def test_no_page_has_what_a_conflict_leaves() -> None:
+    checkout = _DOCS.parent
+    pages = [*_DOCS.glob("*.md"), *checkout.glob("*.md"), checkout / "CHANGELOG.rst"]
+    marks = re.compile(r"^(<{7}|={7}$|>{7})", re.MULTILINE)
+    assert [page.name for page in pages if marks.search(page.read_text(encoding="utf-8"))] == []
