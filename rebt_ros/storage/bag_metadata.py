@@ -17,8 +17,8 @@ NAME: Final = "metadata.yaml"
 #: Longest file that is read (bytes): 700 topics with 40 publishers each, whose QoS is told one by
 #: one, make 8 million.
 LARGEST: Final = 32_000_000
-#: Longest text without QoS that is read as YAML (bytes), which takes a second for each 100,000: 700
-#: topics make 150,000.
+#: Longest text without QoS that is read as YAML (characters): 700 topics make 150,000.
+#: A recorder's 100,000 take half a second, the worst ten times that.
 _LARGEST_YAML: Final = 1_000_000
 #: Deepest nesting of brackets, of which recorders write one or two levels (`[]`); the time that
 #: YAML takes grows with its square.

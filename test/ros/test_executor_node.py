@@ -320,9 +320,9 @@ def test_snapshots_are_sent_when_something_changed(domain: int, peer: Peer, tmp_
         robot = Robot(peer)
         robot.obeys("go")
         snapshots = peer.listen(String, "/executor/snapshot")
-        robot.until(lambda: snapshots)
+        ticked = ["SUCCESS", "SUCCESS", "SUCCESS", "SUCCESS", "INVALID"]
+        robot.until(lambda: snapshots and json.loads(snapshots[-1].data)["nodes"] == ticked)
         first = json.loads(snapshots[-1].data)
-        assert first["nodes"] == ["SUCCESS", "SUCCESS", "SUCCESS", "SUCCESS", "INVALID"]
         assert first["commands"] == {"action": "go"}
         assert first["tip"]
         before = len(snapshots)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
-from executor_examples import GO, READS_X, STOP, learned, where_x_is_small
+from executor_examples import GO, READS_X, STOP, Robot, learned, report, where_x_is_small
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_processes import LATCHED, NodeProcess, Peer, values_of
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, Float64MultiArray, Int32, String
 
+import rebt_ros
 from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.simulated_robot.robot import State
@@ -310,22 +310,45 @@ def test_an_empty_list_is_refused_where_there_must_be_something(
         assert len(process.stderr.splitlines()) == 1
 
 
-def test_a_tree_that_tests_texts_is_refused_with_the_feature(
-    domain: int, peer: Peer, tmp_path: Path
-) -> None:
-    table = tmp_path / "table.csv"
+@pytest.fixture(scope="module")
+def tree_of_texts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A tree that was learned from a table of texts."""
+    directory = tmp_path_factory.mktemp("texts")
+    table = directory / "table.csv"
     rows = "".join(
         f"{color},{'stop' if color == 'red' else 'go'}\n" for color in ("red", "blue") * 20
     )
     table.write_text("color,action\n" + rows)
-    import rebt_ros
-
-    result = rebt_ros.learn(table, out=tmp_path / "out")
+    result = rebt_ros.learn(table, out=directory / "out")
     assert any("'color', which holds texts (blue, red)" in note for note in result.notes)
-    document = json.loads((tmp_path / "out" / "tree.json").read_text())
-    assert document
-    path = tmp_path / "out" / "tree.json"
-    with NodeProcess("executor_node", domain, tmp_path, {"tree_file": path}) as executor:
-        assert executor.wait() == 1
-    assert "the tree tests 'color' for texts (blue, red)" in executor.stderr
+    return directory / "out" / "tree.json"
+
+
+def test_a_tree_that_tests_texts_is_not_run_and_whoever_sends_states_is_told(
+    domain: int, peer: Peer, tmp_path: Path, tree_of_texts: Path
+) -> None:
+    parameters = {"tree_file": tree_of_texts, "enabled": True}
+    reason = "tree.json is not run: the tree tests 'color' for texts (blue, red), which no state"
+    with NodeProcess("executor_node", domain, tmp_path, parameters) as executor:
+        commands = peer.listen(String, "command")
+        peer.state(1.0)
+        _warns(peer, "executor", "waiting for a tree: ", reason)
+        executor.says(reason)
+        assert reason in peer.call("/executor/enable", True).message
+        assert commands == []
+        # One that can be run takes its place.
+        peer.connect(String, "behavior_tree", LATCHED).publish(String(data=dumps(READS_X)))
+        robot = Robot(peer)
+        robot.obeys("go")
+        assert reason not in report(peer)["condition"]
+        assert executor.stop() == 0
     assert "Traceback" not in executor.stderr
+
+
+def test_a_tree_of_texts_that_is_published_is_refused(
+    domain: int, peer: Peer, tmp_path: Path, tree_of_texts: Path
+) -> None:
+    with NodeProcess("executor_node", domain, tmp_path) as executor:
+        publisher = peer.connect(String, "behavior_tree", LATCHED)
+        publisher.publish(String(data=tree_of_texts.read_text()))
+        executor.says("a behavior tree was refused (there is no tree yet): the tree tests 'color'")

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 from rclpy.clock import Clock, JumpThreshold, TimeJump
@@ -38,7 +39,7 @@ from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.executor.robot_commands import RobotCommands
 from rebt_ros.ros.executor.robot_inputs import RobotInputs
 from rebt_ros.ros.executor.settings import declare_settings
-from rebt_ros.ros.executor.tree_program import Preparation, TreeProgram
+from rebt_ros.ros.executor.tree_program import Preparation, TreeProgram, UnmeasurableError
 from rebt_ros.ros.graph_watch import Finding, GraphWatch
 from rebt_ros.ros.robot_files import RobotTopics
 from rebt_ros.ros.topic_names import check_topics
@@ -101,6 +102,9 @@ class ExecutorNode(Node):
         self._program: TreeProgram | None = None
         # Runs once it is known that its topics send what it reads.
         self._candidate: TreeProgram | None = None
+        # Why the tree of a file does not run, and the topics that it would have read.
+        self._unusable: list[str] = []
+        self._awaited: frozenset[str] = frozenset()
         self._latest: dict[str, Message] = {}
         self._subscriptions_by_topic: dict[str, Subscription] = {}
         self._robots: dict[TreeProgram, RobotInputs] = {}
@@ -141,10 +145,7 @@ class ExecutorNode(Node):
         for topic in self._settings.takeover.topics:
             self.create_subscription(String, topic, partial(self._on_person, topic), 10)
         if self._settings.tree_file is not None:
-            learned = read_tree(self._settings.tree_file)
-            program = self._preparation.program(learned, dumps(learned))
-            self._check_topics(program)
-            self._install(program)
+            self._open(self._settings.tree_file)
         self.create_service(SetBool, "~/enable", self._enable)
         self.create_service(Trigger, "~/explain", self._explain)
         self._timer = self.create_timer(1.0 / self._settings.rate, self._tick, clock=self._time)
@@ -169,6 +170,24 @@ class ExecutorNode(Node):
         self._interrupt()
 
     # --- trees ---
+
+    def _open(self, path: Path) -> None:
+        """Runs the tree of a file.
+
+        A tree that tests texts is a sound one, though not for topics of numbers: another one may
+        come, and until then whoever sends states finds the executor and is told what is wrong.
+        """
+        learned = read_tree(path)
+        try:
+            program = self._preparation.program(learned, dumps(learned))
+        except UnmeasurableError as err:
+            self._unusable = [f"{path} is not run: {str(err).rstrip('.')}"]
+            self._awaited = err.topics
+            self._subscribe()
+            self.get_logger().warning(f"{self._condition()}.")
+            return
+        self._check_topics(program)
+        self._install(program)
 
     def _on_document(self, message: String) -> None:
         # Reading may take longer than a tick.
@@ -279,6 +298,8 @@ class ExecutorNode(Node):
             self._robots.pop(program).close()
         plain = [one for one in programs if one not in self._robots]
         topics = {topic for one in plain for topic in one.inputs.topics}
+        if not programs:
+            topics |= self._awaited
         for topic in self._subscriptions_by_topic.keys() - topics:
             self.destroy_subscription(self._subscriptions_by_topic.pop(topic))
             self._latest.pop(topic, None)
@@ -504,7 +525,9 @@ class ExecutorNode(Node):
         """What the executor does, or what it waits for."""
         now = self._now()
         if self._program is None:
-            return "waiting for a tree"
+            return (
+                f"waiting for a tree: {self._unusable}" if self._unusable else "waiting for a tree"
+            )
         if not self._enabled:
             return "disabled"
         if self._simulated and now == 0:
@@ -572,7 +595,8 @@ class ExecutorNode(Node):
         values |= self._faults.counts
         if self._faults.recent:
             return Report(Level.WARN, f"{condition}; {self._faults.recent}", values)
-        blocked = self._enabled and condition != "running"
+        unusable = self._program is None and bool(self._unusable)
+        blocked = unusable or (self._enabled and condition != "running")
         problems = self._problems()
         if problems:
             return Report(Level.WARN, "; ".join((condition, *problems)), values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from rclpy.exceptions import InvalidTopicNameException
@@ -23,6 +23,19 @@ from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.ros.command_channels import topic_of
 from rebt_ros.ros.executor.settings import ExecutorSettings
 from rebt_ros.verification.errors import RuleError
+
+
+class UnmeasurableError(DocumentError):
+    """A tree tests texts, which no message of numbers has.
+
+    Args:
+        sentence: Which ones.
+        topics: The state topics that it reads.
+    """
+
+    def __init__(self, sentence: str, topics: Iterable[str]) -> None:
+        super().__init__(sentence)
+        self.topics = frozenset(topics)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -86,9 +99,9 @@ class Preparation:
 
         Raises:
             DocumentError: It cannot be run here.
+            UnmeasurableError: It could be, did it not test texts.
         """
         _check_channels(learned)
-        _check_measurable(learned)
         reported = bool(self._settings.action_result_topic)
         try:
             kept(learned, self._rules, action_results=reported)
@@ -103,6 +116,7 @@ class Preparation:
                 raise DocumentError(
                     f"the tree reads the state topic {one!r}, an invalid name."
                 ) from err
+        _check_measurable(learned, inputs.topics)
         histories = {
             channel: self._histories.setdefault(channel, ActionHistory())
             for channel in channels_of(learned)
@@ -133,11 +147,12 @@ def _check_channels(learned: LearnedTree) -> None:
         topic_of("command", channel, channels)
 
 
-def _check_measurable(learned: LearnedTree) -> None:
+def _check_measurable(learned: LearnedTree, topics: Iterable[str]) -> None:
     for feature in unmeasurable(learned):
-        raise DocumentError(
+        raise UnmeasurableError(
             f"the tree tests {feature.name!r} for texts ({feature.examples}), which "
-            "no state topic can carry: learn from numbers, such as 0, 1 and 2."
+            "no state topic can carry; learn from numbers, such as 0, 1 and 2.",
+            topics,
         )
 
 
