@@ -190,11 +190,11 @@ def _lines(configuration: str, subtree: SubtreeResult) -> Iterator[dict[str, Any
         baseline = subtree.scores[Mode.BASELINE]
         yield simulated | {
             "mode": mode.value,
-            "minimum": score.minimum,
-            "minimum_at_least": score.minimum_at_least,
-            "median": score.median,
-            "baseline_minimum": baseline.minimum,
-            "baseline_median": baseline.median,
+            "minimum": _distance(score.minimum),
+            "minimum_at_least": _distance(score.minimum_at_least),
+            "median": _distance(score.median),
+            "baseline_minimum": _distance(baseline.minimum),
+            "baseline_median": _distance(baseline.median),
             "outcome_of_minimum": _outcome(score.minimum, baseline.minimum),
             "outcome_of_median": _outcome(score.median, baseline.median),
             "found_nodes": score.nodes,
@@ -205,6 +205,11 @@ def _lines(configuration: str, subtree: SubtreeResult) -> Iterator[dict[str, Any
             "exact_levels": score.exact_levels,
             "found": score.found,
         }
+
+
+def _distance(distance: float) -> float:
+    """The same number, whole where it is: JSON does not tell 2.0 from 2."""
+    return int(distance) if distance == int(distance) else distance
 
 
 def _outcome(distance: float, baseline: float) -> str:

@@ -211,5 +211,5 @@ def _networkx_pairs(
             bounds = distances.between(one, other)
             distance = measure.distance(one, other, settings.pair_seconds)
             sizes = (len(one), len(other))
-            found.append(NetworkxPair(sizes, bounds.lower, bounds.upper, distance))
+            found.append(NetworkxPair(sizes, float(bounds.lower), float(bounds.upper), distance))
     return tuple(found)

@@ -113,9 +113,9 @@ def score(
     ]
     level, best = min(scored, key=lambda pair: (pair[1].distance, len(pair[1].best.tree)))
     return Score(
-        minimum=best.distance,
-        minimum_at_least=min(one.at_least for _, one in scored),
-        median=median(one.distance for _, one in scored),
+        minimum=float(best.distance),
+        minimum_at_least=float(min(one.at_least for _, one in scored)),
+        median=float(median(one.distance for _, one in scored)),
         levels=len(scored),
         exact_levels=sum(one.distance == one.at_least for _, one in scored),
         nodes=len(best.best.tree),

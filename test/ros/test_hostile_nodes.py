@@ -101,8 +101,8 @@ WORK: dict[str, tuple[dict[str, object], Callable[[Peer, Path], None]]] = {
     "recorder": ({"state_wait": 0.2}, _recorder),
     "learner": ({}, _learner),
     "executor": ({"tree_file": "tree # %.json"}, _executor),
-    "demonstrator": ({}, _demonstrator),
-    "robot": ({}, _robot),
+    "demonstrator": ({"plain": True}, _demonstrator),
+    "robot": ({"plain": True}, _robot),
     "synthetic_robot": ({"config": "wink #1.json"}, _synthetic_robot),
 }
 
