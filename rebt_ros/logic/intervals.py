@@ -7,7 +7,8 @@ the truth value is unchanged in every state.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import permutations
+from itertools import groupby
+from operator import itemgetter
 
 from rebt_ros.logic.conditions import KNOWN, Condition, Interval, Literal, Quantity, Threshold
 from rebt_ros.logic.factoring import Factored
@@ -50,14 +51,19 @@ def merged(conjunction: Iterable[Literal]) -> tuple[Literal, ...]:
 def enclosing_literals(conditions: Sequence[Condition]) -> list[int]:
     """For each code, the mask of the literals with which it is an interval; none but for ``>``."""
     enclosing = [0] * (2 * len(conditions))
-    of_quantity: dict[Quantity, list[int]] = {}
+    of_quantity: dict[Quantity, list[tuple[float, int]]] = {}
     for place, condition in enumerate(conditions):
         if isinstance(condition, Threshold):
-            of_quantity.setdefault(condition.quantity, []).append(place)
-    for places in of_quantity.values():
-        for lower, upper in permutations(places, 2):
-            if _interval(~Literal(conditions[lower]), Literal(conditions[upper])) is not None:
-                enclosing[2 * lower] |= 1 << (2 * upper + 1)
+            of_quantity.setdefault(condition.quantity, []).append((condition.value, place))
+    for thresholds in of_quantity.values():
+        # From the highest one down, each with all that are higher.
+        higher = 0
+        for value, equal in groupby(sorted(thresholds, reverse=True), key=itemgetter(0)):
+            places = [place for _, place in equal]
+            for lower in places:
+                enclosing[2 * lower] = higher
+            if value != KNOWN:
+                higher |= mask(2 * upper + 1 for upper in places)
     return enclosing
 
 

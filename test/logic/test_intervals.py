@@ -25,7 +25,7 @@ from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import KNOWN, Interval, IsTrue, Literal, Quantity, Threshold
 from rebt_ros.logic.factoring import Factored
-from rebt_ros.logic.intervals import merged, with_intervals
+from rebt_ros.logic.intervals import enclosing_literals, merged, with_intervals
 from rebt_ros.paper.rules import leaf_rules
 
 LOW, HIGH, OTHER = (
@@ -187,3 +187,19 @@ def test_intervals_make_a_tree_no_larger(
     for one in nodes.conditions(tree):
         assert one.literal.positive or not isinstance(one.literal.condition, Interval)
     assert not any(isinstance(one.literal.condition, Interval) for one in nodes.conditions(plain))
+
+
+def thresholds() -> st.SearchStrategy[list[Threshold]]:
+    values = st.sampled_from([-1.0, 0.0, 0.5, 2.0, KNOWN])
+    return st.lists(st.builds(Threshold, st.sampled_from(["x", "y"]), values), unique=True)
+
+
+@given(thresholds())
+def test_those_that_enclose_are_those_that_are_merged(conditions: list[Threshold]) -> None:
+    enclosing = enclosing_literals(conditions)
+    for place, lower in enumerate(conditions):
+        assert enclosing[2 * place + 1] == 0
+        for other, upper in enumerate(conditions):
+            together = merged((~Literal(lower), Literal(upper)))
+            encloses = bool(enclosing[2 * place] >> (2 * other + 1) & 1)
+            assert encloses == (len(together) == 1 and place != other)
