@@ -234,11 +234,17 @@ def _ruled(
 def write(learned: Learned, directory: Path) -> tuple[str, ...]:
     """Writes what the command `learn` does; returns notes on what could not be made.
 
+    A tree.json that is there stays: the node has written it, and may have published another since.
+
     Raises:
         StorageError: A file cannot be written.
     """
     from rebt_ros.offline.learning_from_files import write_files
+    from rebt_ros.offline.level_files import TREE_FILE
+    from rebt_ros.storage.tree_file import write_tree
 
+    if not (directory / TREE_FILE).exists():
+        write_tree(directory / TREE_FILE, learned.result.learned)
     before = learned.result.notes
     inputs = [learned.demonstrations]
     return write_files(directory, learned.result, inputs, learned.options).notes[len(before) :]

@@ -21,16 +21,18 @@ from rebt_ros.learning.options import LearnOptions
 from rebt_ros.learning.progress import Progress
 from rebt_ros.learning.replaying import rows_for
 from rebt_ros.offline.level_files import (
+    TREE_FILE,
     channel_directories,
     clear_levels,
-    write_behavior_tree,
     write_decision_tree,
     write_levels,
+    write_tree_pictures,
 )
 from rebt_ros.offline.result import OfflineLearning, write_summary
 from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.inputs import InputOptions, as_paths, load
+from rebt_ros.storage.tree_file import write_tree
 from rebt_ros.verification.errors import BrokenRuleError, RuleError
 from rebt_ros.verification.rules import RuleSet
 from rebt_ros.verification.ruling import Ruled, ruled
@@ -107,6 +109,7 @@ def learn(
     if out is not None:
         writing = _part(progress, _LEARNING_SHARE, 1.0)
         most = most_levels if levels else 0
+        write_tree(Path(out) / TREE_FILE, result.learned)
         result = write_files(Path(out), result, paths, options, most, writing)
     progress("done", 1.0)
     return result
@@ -120,7 +123,9 @@ def write_files(
     most_levels: int = 0,
     progress: Progress = lambda stage, share: None,
 ) -> OfflineLearning:
-    """Writes all files of a learned tree; see `learn`.
+    """Writes all files of a learned tree but tree.json; see `learn`.
+
+    They may take a while, and which tree is published may change meanwhile.
 
     Args:
         directory: Where to.
@@ -202,7 +207,7 @@ def _write_trees(
     # The studio waits for these; pictures take longer.
     for name, learning in channels:
         notes += write_learning(directory / name, learning)
-    notes += write_behavior_tree(directory, result.learned)
+    notes += write_tree_pictures(directory, result.learned)
     write_text_atomically(directory / "tree.txt", render_text(result.learned))
     for place, (name, learning) in enumerate(channels):
         beside = directory / name

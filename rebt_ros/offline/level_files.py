@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from rebt_ros.learning.levels import Levels, PruningLevel
 from rebt_ros.learning.progress import Progress
 from rebt_ros.storage.atomic import write_bytes_atomically, write_text_atomically
 from rebt_ros.storage.tree_file import write_tree
+
+#: The behavior tree document beside its pictures.
+TREE_FILE: Final = "tree.json"
 
 _LEVELS, _SUMMARY = "levels", "summary.json"
 _PLOT = "accuracy_vs_alpha"
@@ -54,7 +57,16 @@ def write_behavior_tree(directory: Path, learned: LearnedTree) -> list[str]:
     Returns:
         Notes on what could not be made; no full stops.
     """
-    write_tree(directory / "tree.json", learned)
+    write_tree(directory / TREE_FILE, learned)
+    return write_tree_pictures(directory, learned)
+
+
+def write_tree_pictures(directory: Path, learned: LearnedTree) -> list[str]:
+    """Writes tree.svg, tree.dot, and tree.png where possible.
+
+    Returns:
+        Notes on what could not be made; no full stops.
+    """
     write_text_atomically(directory / "tree.svg", render_svg(learned))
     write_text_atomically(directory / "tree.dot", render_dot(learned))
     return _write_picture(directory / "tree.png", partial(render_png, learned))

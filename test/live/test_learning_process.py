@@ -170,6 +170,16 @@ def test_the_files_of_what_was_learned_last_are_written_once(
     assert not (tmp_path / "again").exists()
 
 
+def test_the_tree_that_is_published_stays_while_files_are_written(
+    process: LearningProcess, request_: Request, tmp_path: Path
+) -> None:
+    process.ask(request_, cancelled=threading.Event())
+    (tmp_path / "tree.json").write_text("another one, published meanwhile")
+    process.write(tmp_path)
+    assert (tmp_path / "tree.json").read_text() == "another one, published meanwhile"
+    assert (tmp_path / "tree.svg").exists()
+
+
 def test_files_that_cannot_be_written_are_no_end_of_the_process(
     process: LearningProcess, request_: Request, tmp_path: Path
 ) -> None:
