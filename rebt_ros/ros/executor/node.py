@@ -102,8 +102,9 @@ class ExecutorNode(Node):
         self._program: TreeProgram | None = None
         # Runs once it is known that its topics send what it reads.
         self._candidate: TreeProgram | None = None
-        # Why the tree of a file does not run, and the topics that it would have read.
-        self._unusable: list[str] = []
+        # How the sentence on waiting ends where the tree of a file does not run, and the topics
+        # that it would have read.
+        self._unusable = ""
         self._awaited: frozenset[str] = frozenset()
         self._latest: dict[str, Message] = {}
         self._subscriptions_by_topic: dict[str, Subscription] = {}
@@ -181,7 +182,7 @@ class ExecutorNode(Node):
         try:
             program = self._preparation.program(learned, dumps(learned))
         except UnmeasurableError as err:
-            self._unusable = [f"{path} is not run: {str(err).rstrip('.')}"]
+            self._unusable = f": {path} is not run: {str(err).rstrip('.')}"
             self._awaited = err.topics
             self._subscribe()
             self.get_logger().warning(f"{self._condition()}.")
@@ -525,9 +526,7 @@ class ExecutorNode(Node):
         """What the executor does, or what it waits for."""
         now = self._now()
         if self._program is None:
-            return (
-                f"waiting for a tree: {self._unusable}" if self._unusable else "waiting for a tree"
-            )
+            return f"waiting for a tree{self._unusable}"
         if not self._enabled:
             return "disabled"
         if self._simulated and now == 0:
