@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from hypothesis import strategies as st
+from py_trees.common import Status
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import (
@@ -495,3 +496,16 @@ def implies(stronger: Literal, weaker: Literal) -> bool:
     ):
         return a.value <= b.value if stronger.positive else a.value >= b.value
     return stronger == weaker
+
+
+class EndsInTurn:
+    """A commander whose actions end one after the other as a list says, and then go on."""
+
+    def __init__(self, statuses: list[Status]) -> None:
+        self._statuses = iter(statuses)
+
+    def update(self, action: nodes.Action) -> Status:
+        return next(self._statuses, Status.RUNNING)
+
+    def halt(self, action: nodes.Action) -> None:
+        pass

@@ -96,7 +96,7 @@ class Explaining:
             raise OptionError("no tree is published yet.")
         values = [_coded(feature, moment.values) for feature in learned.features]
         histories = {
-            channel: _history(self._timeline.done_before(moment.time, channel))
+            channel: ActionHistory(self._timeline.done_before(moment.time, channel))
             for channel in moment.commands
         }
         try:
@@ -183,12 +183,3 @@ def _coded(feature: Feature, values: Mapping[str, Any]) -> float:
         return float(value)
     name = value if isinstance(value, str) else f"{value:g}"
     return float(feature.categories.index(name)) if name in feature.categories else math.nan
-
-
-def _history(done: Sequence[str]) -> ActionHistory:
-    history = ActionHistory()
-    for label in done:
-        history.begin(label)
-    if done:
-        history.previous = done[-1]
-    return history

@@ -54,7 +54,7 @@ class Shelf:
 
     directory: Path
     clock: Callable[[], float] = time.time
-    _known: dict[Path, tuple[tuple[int, int], dict[str, Json]]] = field(default_factory=dict)
+    _known: dict[Path, tuple[tuple[int, int], dict[str, Json] | None]] = field(default_factory=dict)
 
     def views(self) -> dict[str, dict[str, Json]]:
         """All demonstrations by name, oldest first, each with a thumbnail.
@@ -63,7 +63,13 @@ class Shelf:
         """
         found = dict(self._files())
         self._known = {path: known for path, known in self._known.items() if path in found}
-        return {_name(path): self._view(path, suffix) for path, suffix in found.items()}
+        views = {}
+        for path, suffix in found.items():
+            content = self._content_of(path)
+            if content is not None:
+                flags = {"kept": suffix == "", "deleted": suffix == DELETED}
+                views[_name(path)] = content | flags
+        return views
 
     def leave_out(self, name: str) -> str:
         """Keeps a demonstration, but does not learn from it.
@@ -82,7 +88,7 @@ class Shelf:
             OptionError: There is none of this name.
             StorageError: Its file cannot be renamed.
         """
-        suffix = next((end for path, end in self._files() if _name(path) == name), "")
+        suffix = self._suffix_of(name)
         if suffix not in {LEFT_OUT, ASIDE}:
             raise OptionError(f"{name} is not left out.")
         self._rename(name, suffix, "")
@@ -95,8 +101,7 @@ class Shelf:
             OptionError: There is none of this name.
             StorageError: Its file cannot be renamed.
         """
-        suffix = next((end for path, end in self._files() if _name(path) == name), "")
-        self._rename(name, suffix, DELETED)
+        self._rename(name, self._suffix_of(name), DELETED)
         return f"{name} is deleted; for {UNDO_TIME / 60:.0f} minutes it can be had back."
 
     def restore(self, name: str) -> str:
@@ -151,15 +156,19 @@ class Shelf:
                 raise StorageError(f"{path} cannot be removed ({err.strerror}).") from err
 
     def _files(self) -> Iterator[tuple[Path, str]]:
-        """The recordings, and what follows their names."""
+        """The files that are called like recordings, and what follows their names."""
         try:
             paths = sorted(self.directory.iterdir())
         except OSError:
             return
         for path in paths:
             for suffix in ("", LEFT_OUT, ASIDE, DELETED):
-                if path.name.endswith(SUFFIX + suffix) and is_recording(path):
+                if path.name.endswith(SUFFIX + suffix):
                     yield path, suffix
+
+    def _suffix_of(self, name: str) -> str:
+        """What follows the name of a demonstration; nothing where there is none."""
+        return next((suffix for path, suffix in self._files() if _name(path) == name), "")
 
     def _cut(self, name: str, stretches: Sequence[tuple[float, float]]) -> None:
         path = self._path(name, "")
@@ -176,7 +185,8 @@ class Shelf:
     def _path(self, name: str, suffix: str) -> Path:
         """The file of a demonstration: a name comes from a browser, and may not lead elsewhere."""
         path = self.directory / f"{name}{SUFFIX}{suffix}"
-        if path.parent != self.directory or path not in dict(self._files()):
+        # Nor does every name name a file: some have a byte 0.
+        if path.parent != self.directory or not path.is_file() or not is_recording(path):
             raise OptionError(f"there is no demonstration {name!r} any more, or it has changed.")
         return path
 
@@ -190,17 +200,18 @@ class Shelf:
         except OSError as err:
             raise StorageError(f"{path} cannot be renamed ({err.strerror}).") from err
 
-    def _view(self, path: Path, suffix: str) -> dict[str, Json]:
+    def _content_of(self, path: Path) -> dict[str, Json] | None:
+        """What is in a file; None where it is no recording, or gone."""
         try:
             status = path.stat()
         except OSError:
-            return {}
+            return None
         mark = (status.st_mtime_ns, status.st_size)
         known = self._known.get(path)
         if known is None or known[0] != mark:
-            known = (mark, _content(path))
+            known = (mark, _content(path) if is_recording(path) else None)
             self._known[path] = known
-        return {**known[1], "kept": suffix == "", "deleted": suffix == DELETED}
+        return known[1]
 
 
 def _name(path: Path) -> str:

@@ -76,7 +76,7 @@ class Timeline:
 
     def at(self, time: float) -> Moment | None:
         """What was so at a time; None where that is too long ago, or nothing was known yet."""
-        place = bisect_right([moment.time for moment in self._moments], time)
+        place = bisect_right(self._moments, time, key=lambda moment: moment.time)
         return self._moments[place - 1] if place else None
 
     def done_before(self, time: float, channel: str) -> Sequence[str]:

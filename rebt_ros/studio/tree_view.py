@@ -135,20 +135,12 @@ def _meaning(node: nodes.Node, spans: Mapping[str, Span]) -> dict[str, Json]:
 def _quantity(quantity: Quantity, spans: Mapping[str, Span]) -> dict[str, Json]:
     """A feature, or the two of a difference, with the range that was shown."""
     if isinstance(quantity, Difference):
+        names = {"minuend": quantity.minuend, "subtrahend": quantity.subtrahend}
         first, second = spans.get(quantity.minuend), spans.get(quantity.subtrahend)
-        known = first is not None and second is not None
-        return {
-            "minuend": quantity.minuend,
-            "subtrahend": quantity.subtrahend,
-            "low": first.low - second.high if known and first and second else None,
-            "high": first.high - second.low if known and first and second else None,
-        }
-    span = spans.get(quantity)
-    return {
-        "feature": quantity,
-        "low": span.low if span else None,
-        "high": span.high if span else None,
-    }
+        span = first and second and Span(first.low - second.high, first.high - second.low)
+    else:
+        names, span = {"feature": quantity}, spans.get(quantity)
+    return {**names, "low": span.low if span else None, "high": span.high if span else None}
 
 
 def _spans(learned: LearnedTree) -> dict[str, Span]:

@@ -100,8 +100,7 @@ class Workbench:
             RebtError: It cannot be done.
         """
         with self._lock:
-            self._draft = self._there().changed(what, change)
-            self._show_draft()
+            self._work_on(self._there().changed(what, change))
         return f"{what[:1].upper()}{what[1:]}: done. Publish to let the robot use it."
 
     def undo(self) -> str:
@@ -113,8 +112,7 @@ class Workbench:
         with self._lock:
             draft = self._there()
             what = draft.undoes
-            self._draft = draft.undone()
-            self._show_draft()
+            self._work_on(draft.undone())
         return f"taken back: {what}."
 
     def redo(self) -> str:
@@ -126,8 +124,7 @@ class Workbench:
         with self._lock:
             draft = self._there()
             what = draft.redoes
-            self._draft = draft.redone()
-            self._show_draft()
+            self._work_on(draft.redone())
         return f"done again: {what}."
 
     def reset(self) -> str:
@@ -137,8 +134,7 @@ class Workbench:
             OptionError: Nothing was learned.
         """
         with self._lock:
-            self._draft = self._there().reset()
-            self._show_draft()
+            self._work_on(self._there().reset())
         return "the draft is what was learned, again."
 
     @property
@@ -202,6 +198,10 @@ class Workbench:
             self._board.replace(Section.NAMES, names)
         return f"{name} is shown as {shown or name}."
 
+    def _work_on(self, draft: Draft) -> None:
+        self._draft = draft
+        self._show_draft()
+
     def _there(self) -> Draft:
         if self._draft is None:
             raise OptionError("there is nothing to change yet: learn a tree first.")
@@ -225,8 +225,7 @@ class Workbench:
             self._board.replace(Section.DRAFT, {})
             return
         self._levels = levels_view(learning)
-        self._draft = Draft.begin(learning)
-        self._show_draft()
+        self._work_on(Draft.begin(learning))
 
     def _show_draft(self) -> None:
         if self._draft is None:

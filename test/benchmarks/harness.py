@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
+from statistics import median, quantiles
 from typing import Any
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -196,3 +196,23 @@ def _as_json(figure: Figure) -> dict[str, object]:
         "detail": figure.detail,
         **spreads,
     }
+
+
+def latencies(
+    label: str, ours: Sequence[Sequence[float]], limit: Sequence[Sequence[float]]
+) -> list[Figure]:
+    """A figure for the median and one for the 99th percentile of durations.
+
+    Args:
+        label: What they are of, with a place for the name of the percentile.
+        ours: Milliseconds, round by round.
+        limit: The same of what ours is compared with.
+    """
+    figures = []
+    for name, place in (("p50", 49), ("p99", 98)):
+        one, other = (
+            Spread(tuple(quantiles(trips, n=100)[place] for trips in rounds))
+            for rounds in (ours, limit)
+        )
+        figures.append(Figure(label.format(name), one.least / other.least, 1.3, one, other, "ms"))
+    return figures

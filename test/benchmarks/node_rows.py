@@ -7,12 +7,11 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from statistics import quantiles
 from typing import Any
 
 import recorder
 from executor_examples import READS_X
-from harness import Figure, Settings, Spread
+from harness import Figure, Settings, Spread, latencies
 from recorder_trials import resident
 from ros_processes import NodeProcess, Peer, own_domain
 from std_msgs.msg import Float64MultiArray, String
@@ -88,15 +87,8 @@ def latency(settings: Settings) -> list[Figure]:
     for _ in range(settings.rounds):
         for kind, trips in found.items():
             trips.append(measure(kind))
-    figures = []
-    for name, place in (("p50", 49), ("p99", 98)):
-        ours, bare = (
-            Spread(tuple(quantiles(one, n=100)[place] for one in found[kind]))
-            for kind in ("executor", "bare")
-        )
-        label = f"state -> command, {name}, at 100 Hz / a bare node that answers"
-        figures.append(Figure(label, ours.least / bare.least, 1.3, ours, bare, "ms"))
-    return figures
+    label = "state -> command, {}, at 100 Hz / a bare node that answers"
+    return latencies(label, found["executor"], found["bare"])
 
 
 def _round_trips(peer: Peer, states: int) -> list[float]:

@@ -11,12 +11,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from statistics import quantiles
 from typing import Any
 
 import robot_bags
 from geometry_msgs.msg import Twist
-from harness import Figure, Settings, Spread, alternate, compared
+from harness import Figure, Settings, alternate, compared, latencies
 from recorder_trials import cpu_seconds
 from robot_by_hand import scan
 from robot_reading import ROBOT_FILE
@@ -137,15 +136,8 @@ def latency(settings: Settings) -> list[Figure]:
     for _ in range(settings.rounds):
         for by_hand, trips in found.items():
             trips.append(measure(*by_hand))
-    figures = []
-    for name, place in (("p50", 49), ("p99", 98)):
-        ours, limit = (
-            Spread(tuple(quantiles(trips, n=100)[place] for trips in found[by_hand]))
-            for by_hand in ((), ("answer",))
-        )
-        label = f"scan -> Twist, {name}, at 50 Hz / a node that does the same by hand"
-        figures.append(Figure(label, ours.least / limit.least, 1.3, ours, limit, "ms"))
-    return figures
+    label = "scan -> Twist, {}, at 50 Hz / a node that does the same by hand"
+    return latencies(label, found[()], found["answer",])
 
 
 def _round_trips(peer: Peer, scans: int) -> list[float]:

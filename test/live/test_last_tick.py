@@ -17,19 +17,6 @@ GO, GRASP, TURN, WAIT = some.ACTIONS
 NEAR = some.at_most("distance", 0.3)
 
 
-class _Ends:
-    """A commander whose actions end one after the other as a list says, and then go on."""
-
-    def __init__(self, statuses: list[Status]) -> None:
-        self._statuses = iter(statuses)
-
-    def update(self, action: nodes.Action) -> Status:
-        return next(self._statuses, Status.RUNNING)
-
-    def halt(self, action: nodes.Action) -> None:
-        pass
-
-
 _statuses = st.lists(st.sampled_from((Status.SUCCESS, Status.FAILURE, Status.RUNNING)), max_size=40)
 
 
@@ -38,7 +25,7 @@ def test_every_tick_is_recorded_as_it_was(
     tree: nodes.Node, states: list[tuple[float, ...]], statuses: list[Status]
 ) -> None:
     tree = executable(tree)
-    runtime = TreeRuntime(some.learned(tree), _Ends(statuses), tree)
+    runtime = TreeRuntime(some.learned(tree), some.EndsInTurn(statuses), tree)
     leaves = [node for node in nodes.walk(tree) if isinstance(node, nodes.Action)]
     for state in states:
         tick = runtime.tick(state)
@@ -82,7 +69,9 @@ def _told(runtime: TreeRuntime, learned: object, state: tuple[float, ...]) -> li
 def test_a_sequence_that_remembers_is_told_from_where_it_goes_on() -> None:
     routine = nodes.Sequence((nodes.Condition(NEAR), GRASP, TURN), memory=True)
     learned = some.learned(nodes.Selector((routine, GO)))
-    ends = _Ends([Status.SUCCESS, Status.RUNNING, Status.RUNNING, Status.FAILURE, Status.SUCCESS])
+    ends = some.EndsInTurn(
+        [Status.SUCCESS, Status.RUNNING, Status.RUNNING, Status.FAILURE, Status.SUCCESS]
+    )
     runtime = TreeRuntime(learned, ends)
     near, far = (0.1, 0.5, 0.0, 0.0), (0.9, 0.5, 0.0, 0.0)
     assert _told(runtime, learned, near)[:2] == [
@@ -102,7 +91,7 @@ def test_a_sequence_that_remembers_is_told_from_where_it_goes_on() -> None:
 
 def test_a_branch_whose_action_failed_is_told() -> None:
     learned = some.learned(nodes.Selector((some.when(NEAR, then=GRASP), GO)))
-    runtime = TreeRuntime(learned, _Ends([Status.FAILURE, Status.SUCCESS]))
+    runtime = TreeRuntime(learned, some.EndsInTurn([Status.FAILURE, Status.SUCCESS]))
     assert _told(runtime, learned, (0.1, 0.5, 0.0, 0.0)) == [
         "go",
         "  because no branch before it acts",

@@ -91,19 +91,6 @@ def test_answers_are_those_of_brute_force_over_all_cells(
                 assert verdict.answer is Answer.BROKEN
 
 
-class _AsDrawn:
-    """A commander whose actions end as a list says."""
-
-    def __init__(self, statuses: list[Status]) -> None:
-        self._statuses = iter(statuses)
-
-    def update(self, action: nodes.Action) -> Status:
-        return next(self._statuses, Status.RUNNING)
-
-    def halt(self, action: nodes.Action) -> None:
-        pass
-
-
 ended = st.lists(st.sampled_from((Status.SUCCESS, Status.FAILURE, Status.RUNNING)), max_size=60)
 
 
@@ -131,7 +118,7 @@ def test_what_is_proven_is_kept_tick_after_tick_whatever_is_remembered(
         )
         if verdict.answer is Answer.PROVEN
     ]
-    commander = _AsDrawn(statuses) if results is Results.REPORTED else None
+    commander = some.EndsInTurn(statuses) if results is Results.REPORTED else None
     runtime = TreeRuntime(learned, commander, executable(tree))
     history = runtime.histories[some.CHANNEL]
     for state in states:

@@ -172,10 +172,7 @@ class LearnerNode(Node):
             if call.cancelled.is_set():
                 raise LearningCancelledError
             call.progress = _PUBLISHING
-        write_text_atomically(path, lesson.document)
-        self._versions().keep(lesson.document)
-        self._figures = lesson.figures
-        self._publish(learned, lesson.document)
+        self._put_out(path, learned, lesson.document, lesson.figures)
         # Nobody has to wait for pictures.
         threading.Thread(target=self._write_files, args=[path.parent], daemon=True).start()
         return f"{lesson.sentence} It is published and in {path}.{_in_short(lesson.notes)}"
@@ -273,10 +270,8 @@ class LearnerNode(Node):
             if self._call is not None:
                 raise LearningError(f"busy: {self._call}; try again when that is done.")
             learned = self._keeping_rules(loads(document))
-            write_text_atomically(self._settings.output() / _TREE_FILE, document)
-            version = self._versions().keep(document)
-            self._figures = {}
-            self._publish(learned, document)
+            path = self._settings.output() / _TREE_FILE
+            version = self._put_out(path, learned, document, {})
         said = f"published a proposed tree of {nodes.size(learned.tree)} nodes, {version}."
         self._last = Report(Level.OK, said)
         return version.stem, said
@@ -330,6 +325,20 @@ class LearnerNode(Node):
             f"published the tree in {path.absolute()}; ~/relearn learns from "
             f"{self._settings.demonstrations().absolute()}."
         )
+
+    def _put_out(
+        self, path: Path, learned: LearnedTree, document: str, figures: Mapping[str, str]
+    ) -> Path:
+        """Writes a tree to disk and publishes it then; returns the file of its version.
+
+        Raises:
+            StorageError: It cannot be written.
+        """
+        write_text_atomically(path, document)
+        version = self._versions().keep(document)
+        self._figures = figures
+        self._publish(learned, document)
+        return version
 
     def _publish(self, learned: LearnedTree, document: str) -> None:
         self._learned = learned

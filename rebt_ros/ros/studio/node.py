@@ -14,7 +14,7 @@ from std_msgs.msg import String
 from rebt_ros.demonstration.builder import is_label
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.learning.options import PsaChoice
-from rebt_ros.offline.rules_files import read_rules
+from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
 from rebt_ros.ros.studio.calls import Calls
@@ -46,7 +46,7 @@ class StudioNode(Node):
     def __init__(self) -> None:
         super().__init__("studio")
         self._settings = settings = declare_settings(self)
-        rules = read_rules(settings.rules_file) if settings.rules_file else None
+        rules = rules_for(settings.rules_file)
         self._board = Board()
         self._timeline = Timeline()
         self._shelf = Shelf(settings.demonstrations)

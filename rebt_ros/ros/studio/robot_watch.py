@@ -38,6 +38,8 @@ _STATE_QOS: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFOR
 
 #: How often values are shown (seconds).
 _PERIOD: Final = 0.1
+#: Between two looks at who publishes (seconds).
+_LOOK_PERIOD: Final = 0.5
 #: A node that says nothing for so long is gone (seconds).
 _SILENCE: Final = 4.0
 
@@ -94,6 +96,7 @@ class RobotWatch:
             node.create_subscription(String, topic, partial(self._on_person, topic), 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(_PERIOD, self._show, clock=steady)
+        node.create_timer(_LOOK_PERIOD, self._look, clock=steady)
         for role in self._names.values():
             board.update(Section.NODES, {role: _absent(role)})
         board.replace(Section.ACTIONS, {})
@@ -234,10 +237,13 @@ class RobotWatch:
 
     # --- what is shown ---
 
-    def _show(self) -> None:
-        """Shows the newest values, and who has fallen silent."""
+    def _look(self) -> None:
+        """Looks for publishers of what a robot file names."""
         if self._robot is not None:
             self._robot.look()
+
+    def _show(self) -> None:
+        """Shows the newest values, and who has fallen silent."""
         if self._values:
             shown = {name: value for name, value in self._values.items() if value is not None}
             if shown != self._board.section(Section.VALUES):
