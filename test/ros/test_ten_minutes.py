@@ -8,6 +8,7 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -34,6 +35,15 @@ PROPOSED, CHOSEN, ADDED = (text for kind, text in BLOCKS if kind == "yaml")
 
 #: How long episodes may take on a busy machine (seconds).
 EPISODE: Final = 5 * PATIENCE
+
+#: How the joystick is used, which is what describe proposes.
+USES: Final[Sequence[Callable[[Joy], bool]]] = (
+    lambda joy: joy.buttons[0] == 0,
+    lambda joy: joy.buttons[0] == 1,
+    lambda joy: joy.axes[1] >= 0.5,
+    lambda joy: joy.axes[3] >= 0.5,
+    lambda joy: joy.axes[3] <= -0.5,
+)
 
 EPISODES: Final = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -74,6 +84,10 @@ class Recording:
         for topic, kind in topics.items():
             self._listen(peer, topic, kind)
 
+    def has(self, used: Callable[[Joy], bool]) -> bool:
+        """Whether the joystick has been used so."""
+        return any(isinstance(message, Joy) and used(message) for _, _, message in self._messages)
+
     def write(self, path: Path) -> None:
         some.write_bag(path, sorted(self._messages, key=lambda message: message[0]))
 
@@ -94,7 +108,12 @@ def test_someone_who_follows_the_page_has_a_tree_that_drives(
     with _node("robot", domain, tmp_path):
         episodes = peer.listen(String, "robot/episode", EPISODES)
         with _node("demonstrator", domain, tmp_path):
-            peer.wait_until(lambda: len(episodes) >= 2, EPISODE, "two demonstrations")
+            # The driver may have begun before it is heard.
+            peer.wait_until(
+                lambda: len(episodes) >= 2 and all(map(recording.has, USES)),
+                EPISODE,
+                "demonstrations in which all is done",
+            )
         recording.write(tmp_path / "my_bag")
 
         said = _run("describe", tmp_path)

@@ -58,6 +58,13 @@ class Browser:
         self.driver.get_log("browser")
         self.driver.get(url)
         self.until(lambda: self.run("return document.getElementById('loading').hidden"))
+        self.drawn()
+
+    def drawn(self) -> None:
+        """Waits until the page has drawn what it knows; it draws once a frame."""
+        self.driver.execute_async_script(
+            "requestAnimationFrame(() => requestAnimationFrame(arguments[0]))"
+        )
 
     def run(self, script: str, *given: Any) -> Any:
         """Runs a script in the page."""
@@ -88,7 +95,9 @@ class Browser:
 
     def text(self, selector: str) -> str:
         """The text of an element, shown or not."""
-        return str(self.run("return document.querySelector(arguments[0]).textContent", selector))
+        self.one(selector)
+        found = "return document.querySelector(arguments[0])?.textContent"
+        return str(self.run(found, selector))
 
     def sees(self, words: str, selector: str = "body") -> None:
         """Waits until a text can be seen in an element."""
