@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -34,21 +35,40 @@ NODES = ("demonstrator", "executor", "learner", "recorder", "robot", "studio", "
 
 @pytest.fixture
 def table(tmp_path: Path) -> Path:
+    return _table(tmp_path)
+
+
+def _table(directory: Path) -> Path:
     # The action is one that no narrow encoding knows.
-    path = tmp_path / "table.csv"
+    path = directory / "table.csv"
     path.write_text(f"front,docked,action\n{ROWS}".replace("turn", "dreh … ≤"), encoding="utf-8")
     return path
 
 
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A table and what was learned from it, which tests leave as they are."""
+    directory = tmp_path_factory.mktemp("learned")
+    table = _table(directory)
+    assert _run("learn", table, "--out", directory).returncode == 0
+    return table, directory / "tree.json"
+
+
 def _run(
     command: str, *arguments: object, shell: str = "", **variables: str | None
+) -> subprocess.CompletedProcess[str]:
+    return _python("-m", f"rebt_ros.commands.{command}", *arguments, shell=shell, **variables)
+
+
+def _python(
+    *arguments: object, shell: str = "", **variables: str | None
 ) -> subprocess.CompletedProcess[str]:
     environment = dict(os.environ, PYTHONPATH=str(CHECKOUT)) | {
         name: value for name, value in variables.items() if value is not None
     }
     for name in [name for name, value in variables.items() if value is None]:
         environment.pop(name, None)
-    start = [sys.executable, "-m", f"rebt_ros.commands.{command}", *map(str, arguments)]
+    start = [sys.executable, *map(str, arguments)]
     if shell:
         start = ["sh", "-c", f'exec "$@" {shell}', "sh", *start]
     return subprocess.run(
@@ -61,6 +81,28 @@ def _run(
         check=False,
     )
 
+
+#: Runs modules with --help, each in a process of its own that has imported already what they share.
+_HELP = """
+import importlib, json, os, runpy, sys
+directory, *modules = sys.argv[1:]
+for module in modules:
+    importlib.import_module(module)
+codes = {}
+for module in modules:
+    child = os.fork()
+    if not child:
+        sys.argv = [module, "--help"]
+        del sys.modules[module]
+        os.dup2(os.open(os.path.join(directory, module), os.O_CREAT | os.O_WRONLY), 1)
+        try:
+            runpy.run_module(module, run_name="__main__")
+        except SystemExit as end:
+            sys.stdout.flush()
+            os._exit(end.code)
+    codes[module] = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+print(json.dumps(codes))
+"""
 
 ENCODINGS: list[dict[str, str | None]] = [
     {"PYTHONIOENCODING": "ascii"},
@@ -86,24 +128,25 @@ def test_learn_replay_and_show_write_what_the_terminal_can_show(
     assert "dreh … ≤" in (out / "tree.txt").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("environment", ENCODINGS, ids=str)
 def test_every_command_has_help_for_every_terminal(
-    command: str, environment: dict[str, str | None]
+    environment: dict[str, str | None], tmp_path: Path
 ) -> None:
-    done = _run(command, "--help", **environment)
+    commands = [f"rebt_ros.commands.{command}" for command in COMMANDS]
+    done = _python("-c", _HELP, tmp_path, *commands, **environment)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "usage" in done.stdout
+    assert json.loads(done.stdout) == dict.fromkeys(commands, 0)
+    for command in commands:
+        assert "usage" in (tmp_path / command).read_text(errors="replace")
 
 
 @pytest.mark.parametrize("command", ["export", "learn", "replay", "show"])
 def test_a_command_whose_output_is_closed_does_its_work(
-    command: str, table: Path, tmp_path: Path
+    command: str, learned: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    out = tmp_path / "out"
-    assert _run("learn", table, "--out", out).returncode == 0
-    inputs = {"learn": (table, "--out", out), "replay": (out / "tree.json", table)}
-    arguments = inputs.get(command, (out / "tree.json",))
+    table, tree = learned
+    inputs = {"learn": (table, "--out", tmp_path), "replay": (tree, table)}
+    arguments = inputs.get(command, (tree,))
     for shell in (">&-", ">&- 2>&-"):
         done = _run(command, *arguments, shell=shell)
         assert (done.returncode, done.stderr) == (0, "")
@@ -111,11 +154,12 @@ def test_a_command_whose_output_is_closed_does_its_work(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
 @pytest.mark.parametrize("command", ["export", "learn", "replay", "show"])
-def test_a_command_whose_output_is_full_says_so(command: str, table: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    assert _run("learn", table, "--out", out).returncode == 0
-    inputs = {"learn": (table, "--out", out), "replay": (out / "tree.json", table)}
-    done = _run(command, *inputs.get(command, (out / "tree.json",)), shell=">/dev/full")
+def test_a_command_whose_output_is_full_says_so(
+    command: str, learned: tuple[Path, Path], tmp_path: Path
+) -> None:
+    table, tree = learned
+    inputs = {"learn": (table, "--out", tmp_path), "replay": (tree, table)}
+    done = _run(command, *inputs.get(command, (tree,)), shell=">/dev/full")
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
         f"{command}: the output cannot be written (No space left on device)."
@@ -145,9 +189,10 @@ def test_a_file_in_place_of_the_directory_is_named(table: Path) -> None:
     assert str(table) in done.stderr
 
 
-def test_show_writes_each_kind_of_file_and_refuses_others(table: Path, tmp_path: Path) -> None:
-    assert _run("learn", table, "--out", tmp_path).returncode == 0
-    tree = tmp_path / "tree.json"
+def test_show_writes_each_kind_of_file_and_refuses_others(
+    learned: tuple[Path, Path], tmp_path: Path
+) -> None:
+    table, tree = learned
     for suffix, begins in ((".svg", "<?xml"), (".DOT", "digraph"), (".txt", "[o] Selector")):
         path = tmp_path / f"shown{suffix}"
         done = _run("show", tree, "--out", path)
