@@ -53,6 +53,7 @@ studio: build ## Show a simulated robot its task, and go on in the studio: learn
 # colcon test succeeds when tests fail; colcon test-result and the count do not.
 test: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 test: build ## Run the tests on the built package.
+	@.ci/browser.sh
 	@status=0; \
 	PYTHONSAFEPATH=1 $(COLCON) test --packages-select rebt_ros \
 	    --event-handlers console_direct+ $(QUIET) \
