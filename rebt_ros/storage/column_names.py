@@ -20,10 +20,12 @@ _TELLING = 200
 
 #: Columns of these names, in any case, number or date the rows.
 _NUMBERING = frozenset({"stamp", "time", "timestamp", "index", "unnamed: 0"})
-#: Columns of these names do where their values rise.
-_RISING = re.compile(
-    r"t|id|nr|no|n|row|step|seq|sequence|frame|tick|elapsed|.*(?:time|stamp|date|clock|index|_id)",
-)
+#: Columns of these names do where their values rise from every row to the next.
+_COUNTING = re.compile(r"id|nr|no|n|row|step|seq|sequence|frame|tick|.*(?:index|_id)")
+#: Columns of these names do where their values rise or stay: clocks are coarse.
+_DATING = re.compile(r"t|elapsed|.*(?:time|stamp|date|clock)")
+#: Fewer rows do not tell whether values rise.
+FEWEST_RISING = 3
 #: What a name may say behind what it is: a unit of time.
 _UNIT_OF_TIME = re.compile(
     r"[ _]*[\[(]?(?:s|secs?|seconds?|m?secs?|[mun]s|n(?:ano)?secs?|utc|unix|epoch)[\])]?\Z"
@@ -75,12 +77,16 @@ def numbers_rows(name: str, cells: Sequence[str]) -> bool:
     plain = name.strip().lower()
     if plain in _NUMBERING:
         return True
-    if not (_RISING.fullmatch(plain) or _RISING.fullmatch(_UNIT_OF_TIME.sub("", plain))):
+    counts = _COUNTING.fullmatch(plain) is not None
+    if not (counts or _DATING.fullmatch(plain) or _DATING.fullmatch(_UNIT_OF_TIME.sub("", plain))):
         return False
     values = numbers([cell.strip() for cell in cells])
-    if values is None or len(values) < 3:
+    if values is None or len(values) < FEWEST_RISING:
         return False
-    return bool(np.all(np.diff(values) >= 0)) and 2 * len(np.unique(values)) > len(values)
+    rises = np.diff(values)
+    if counts:
+        return bool(np.all(rises > 0))
+    return bool(np.all(rises >= 0)) and 2 * len(np.unique(values)) > len(values)
 
 
 def of_the_actions(names: Sequence[str]) -> int | None:

@@ -16,6 +16,7 @@ from rebt_ros.storage.account import Account
 from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
 from rebt_ros.storage.bag_metadata import NAME as METADATA
+from rebt_ros.storage.column_names import FEWEST_RISING
 from rebt_ros.storage.csv_table import read_csv
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording import SUFFIX, is_recording, read_recording, recordings
@@ -102,7 +103,7 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     sources = [source for path in inputs for source in _readable_sources(path)]
     _check_distinct([path for path, _ in sources])
     _check_options(options, {kind for _, kind in sources})
-    reads = _with_common_features([_READERS[kind](path, options) for path, kind in sources])
+    reads = _with_common_features(_read(sources, options))
     names = _names([path for path, _ in sources], reads)
     return Loaded(
         tuple(read.demonstration for read in reads),
@@ -114,6 +115,26 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         {name: read.account for name, read in zip(names, reads, strict=True) if read.account},
         next((read.robot for read in reads if read.robot is not None), None),
     )
+
+
+def _read(sources: Sequence[tuple[Path, InputKind]], options: InputOptions) -> list[Read]:
+    """Reads them all; a column that numbers the rows of some tables only is a feature of all.
+
+    What is called `row` may be where a robot is, and happen to rise all the way in a table.
+    """
+    reads = [_READERS[kind](path, options) for path, kind in sources]
+    measured = {
+        feature.name
+        for demonstration in (read.demonstration for read in reads)
+        if len(demonstration) >= FEWEST_RISING
+        for feature in demonstration.features
+    }
+    asked_for = measured & frozenset[str]().union(*(read.no_features for read in reads))
+    options = replace(options, features=options.features | asked_for)
+    return [
+        _READERS[kind](path, options) if asked_for & read.no_features else read
+        for (path, kind), read in zip(sources, reads, strict=True)
+    ]
 
 
 def _names(paths: Sequence[Path], reads: Sequence[Read]) -> list[str]:

@@ -304,6 +304,7 @@ def test_columns_are_called_what_the_file_says(text: str, names: list[str], tmp_
         ("header.stamp", "1.5,1.6,1.7"),
         ("id", "7,8,9"),
         ("frame_id", "0,1,2"),
+        ("row", "3,4,7"),
         ("date", "20260101,20260102,20260103"),
     ],
 )
@@ -319,6 +320,12 @@ def test_columns_that_rise_number_the_rows_if_their_names_say_so(
     assert features(name, rising) == ["x"]
     assert features(name, rising[::-1]) == [name, "x"]
     assert features("dist", rising) == ["dist", "x"]
+
+
+@pytest.mark.parametrize("name", ["row", "n", "id", "step", "goal_index"])
+def test_what_stays_from_a_row_to_the_next_does_not_count_rows(name: str, tmp_path: Path) -> None:
+    read = _read(tmp_path, f"{name},x,a\n1,5,go\n2,6,go\n2,7,turn\n3,8,go\n4,8,go\n")
+    assert [feature.name for feature in read.demonstration.features] == [name, "x"]
 
 
 @pytest.mark.parametrize(
@@ -372,16 +379,40 @@ def test_points_part_thousands_where_other_columns_have_decimal_commas(tmp_path:
 
 
 def test_what_is_no_feature_in_a_table_is_none_in_the_others(tmp_path: Path) -> None:
-    rising = tmp_path / "rising.csv"
-    falling = tmp_path / "falling.csv"
-    rising.write_text("step,x,a\n1,5,go\n2,6,go\n3,7,turn\n")
-    falling.write_text("step,x,a\n3,5,go\n2,6,go\n1,7,turn\n")
-    loaded = load([rising, falling])
+    dates = tmp_path / "dates.csv"
+    numbers = tmp_path / "numbers.csv"
+    dates.write_text("when,x,a\n19:25,5,go\n19:26,6,go\n19:27,7,turn\n")
+    numbers.write_text("when,x,a\n3,5,go\n2,6,go\n1,7,turn\n")
+    loaded = load([dates, numbers])
     assert all(
         [feature.name for feature in one.features] == ["x"] and one.states.shape == (3, 1)
         for one in loaded.demonstrations
     )
-    assert any("falling.csv: no feature in every table" in note for note in loaded.notes)
+    assert any("numbers.csv: no feature in every table" in note for note in loaded.notes)
+
+
+@pytest.mark.parametrize("name", ["row", "t", "id", "goal_index"])
+def test_what_only_happens_to_rise_in_a_table_is_a_feature_in_all(
+    name: str, tmp_path: Path
+) -> None:
+    rising = tmp_path / "rising.csv"
+    other = tmp_path / "other.csv"
+    rising.write_text(f"{name},x,a\n1,5,go\n2,6,go\n3,7,turn\n")
+    other.write_text(f"{name},x,a\n3,5,go\n2,6,go\n1,7,turn\n")
+    loaded = load([rising, other])
+    assert [one.states[:, 0].tolist() for one in loaded.demonstrations] == [[1, 2, 3], [3, 2, 1]]
+    assert [one.features[0].name for one in loaded.demonstrations] == [name, name]
+    assert loaded.notes == ()
+
+
+def test_what_numbers_the_rows_of_every_table_is_no_feature_because_of_a_short_one(
+    tmp_path: Path,
+) -> None:
+    paths = [tmp_path / "long.csv", tmp_path / "short.csv"]
+    paths[0].write_text("id,x,a\n1,5,go\n2,6,go\n3,7,turn\n")
+    paths[1].write_text("id,x,a\n4,5,go\n5,6,turn\n")
+    loaded = load(paths)
+    assert [[f.name for f in one.features] for one in loaded.demonstrations] == [["x"], ["x"]]
 
 
 def test_so_many_texts_are_no_feature_that_memory_stays_linear(tmp_path: Path) -> None:
