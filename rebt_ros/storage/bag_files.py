@@ -245,6 +245,10 @@ def _open_plain(file: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
         _open_mcap(file, name, bag)
     elif file.suffix.lower() == ".mcap" and magic != sqlite.MAGIC:
         raise ValueError(f"{file.name} does not begin like an mcap file")
+    elif magic != sqlite.MAGIC and not holds_messages(file):
+        raise InputError(
+            f"{file} is not a bag: name a directory that `ros2 bag record` wrote, or a file in it."
+        )
     else:
         _open_sqlite(file, name, bag, stack)
 
@@ -372,6 +376,14 @@ _STRANGERS: Final[Sequence[tuple[bytes, str]]] = (
     ),
     (b"\x1f\x8b", "is packed with gzip: unpack it with `gunzip`"),
     (b"PK\x03\x04", "is a zip archive: unpack it with `unzip`"),
+    (b"PAR1", "is a Parquet file: write it as CSV, with pandas for example"),
+    (b"ARROW1", "is an Arrow file: write it as CSV, with pandas for example"),
+    (b"\x89HDF", "is an HDF5 file: write it as CSV, with pandas for example"),
+    (b"\x93NUMPY", "is an array of NumPy: write it as CSV, with a line of column names"),
+    (b"\xd0\xcf\x11\xe0", "is a file of an old Excel or Word: save the table as CSV"),
+    (b"%PDF", "is a PDF file: name the file that it was made of"),
+    (b"\xfd7zXZ", "is packed with xz: unpack it with `unxz`"),
+    (b"BZh", "is packed with bzip2: unpack it with `bunzip2`"),
     (b"<!DOCTYPE", "is a page of HTML, as a failed download leaves it: download the file itself"),
     (b"<html", "is a page of HTML, as a failed download leaves it: download the file itself"),
 )

@@ -42,6 +42,8 @@ _NO_NAMES = frozenset({"true", "false", "yes", "no"})
 
 #: What stands between groups of three digits.
 _SEPARATORS = "[ ,'\u2019\u00a0\u202f]"
+#: What typesetters write for minus.
+_MINUS = "\u2212"
 _THOUSANDS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{_SEPARATORS}\d{{3}})+(?:\.\d+)?")
 #: Points between them, where they cannot be decimal points: several, or by what other columns say.
 _POINTED = re.compile(r"[+-]?\d{1,3}(?:\.\d{3}){2,}")
@@ -67,6 +69,8 @@ _FEW_TEXTS, _RECURRING = 20, 0.5
 #: Nor more texts than that: each is an indicator of as many cells as there are rows.
 _MOST_TEXTS = 1000
 _LONGEST_UNIT = 12
+#: Every integer up to here is a number of its own.
+_LARGEST_EXACT = 2.0**53
 _WITH_COMMAS, _WITHOUT_SEPARATORS = "with decimal commas", "without their thousands separators"
 
 
@@ -98,6 +102,11 @@ def is_missing(cell: str) -> bool:
 def is_maybe_missing(cell: str) -> bool:
     """Whether a cell says that there is no value if it stands among numbers or truths."""
     return cell.lower() in _MAYBE_MISSING
+
+
+def is_truth(cell: str) -> bool:
+    """Whether a cell, without blanks around it, says true or false in a word."""
+    return cell.lower() in _TRUTH
 
 
 def is_number(cell: str) -> bool:
@@ -162,36 +171,53 @@ def column(
         cells = ["" if is_missing(stripped := cell.strip()) else stripped for cell in cells]
         plain = numbers(cells)
     if plain is not None:
-        return (_grouped(name, cells) if decimal_commas else None) or _numeric(name, plain)
+        return (_grouped(name, cells) if decimal_commas else None) or _numeric(
+            name, plain, *_rounded(name, cells, plain)
+        )
     distinct = set(cells) - {""}
     if all(map(_MOMENT.fullmatch, distinct)):
         return NoFeature(f"column {name!r} holds dates or times and is no feature")
     sure = [cell for cell in distinct if not is_maybe_missing(cell)]
     if sure and len(sure) < len(distinct):
         filled = ["" if is_maybe_missing(cell) else cell for cell in cells]
-        if (found := _amounts(name, filled, set(sure))) is not None:
+        found = _amounts(name, filled, set(sure), decimal_commas=decimal_commas)
+        if found is not None:
             (word, *_) = (cell for cell in cells if is_maybe_missing(cell))
             note = f"cells of column {name!r} that say {word!r} are missing values"
             return replace(found, notes=(*found.notes, note))
     return (
-        _amounts(name, cells, distinct)
+        _amounts(name, cells, distinct, decimal_commas=decimal_commas)
         or _mostly_numbers(name, cells, line)
         or _texts(name, cells, distinct, line)
     )
 
 
-def _amounts(name: str, cells: Sequence[str], distinct: Set[str]) -> Column | None:
+def _amounts(
+    name: str, cells: Sequence[str], distinct: Set[str], *, decimal_commas: bool
+) -> Column | None:
     """Truths, or numbers however they are written; None where a cell is neither."""
     if {cell.lower() for cell in distinct} <= _TRUTH.keys():
         truth = [_TRUTH[cell.lower()] if cell else np.nan for cell in cells]
         return Column(Feature(name, FeatureKind.BINARY), np.array(truth))
     plain = numbers(cells)
-    return _in_notation(name, cells, distinct) if plain is None else _numeric(name, plain)
+    if plain is not None:
+        return _numeric(name, plain)
+    return _in_notation(name, cells, distinct, decimal_commas=decimal_commas)
 
 
 def _numeric(name: str, values: FloatArray, *notes: str, decimal_commas: bool = False) -> Column:
     empty = (f"column {name!r} is empty",) if np.isnan(values).all() else ()
     return Column(Feature(name), values, (*notes, *empty), decimal_commas)
+
+
+def _rounded(name: str, cells: Sequence[str], values: FloatArray) -> Iterable[str]:
+    """A note where integers are too long to be told apart."""
+    for place in np.flatnonzero(np.abs(values) > _LARGEST_EXACT).tolist():
+        if cells[place].strip().lstrip("+-").isdecimal() and int(cells[place]) != int(
+            values[place]
+        ):
+            yield f"column {name!r} holds integers such as {cells[place]}, which are rounded"
+            return
 
 
 def _grouped(name: str, cells: Sequence[str]) -> Column | None:
@@ -205,17 +231,23 @@ def _grouped(name: str, cells: Sequence[str]) -> Column | None:
     return _numeric(name, values, note)
 
 
-def _in_notation(name: str, cells: Sequence[str], distinct: Iterable[str]) -> Column | None:
+def _in_notation(
+    name: str, cells: Sequence[str], distinct: Iterable[str], *, decimal_commas: bool = False
+) -> Column | None:
     """Numbers as people write them, all in the same way."""
-    units = {_unit(cell) for cell in distinct}
     said: list[str] = []
+    if any(_MINUS in cell for cell in distinct):
+        distinct = {cell.replace(_MINUS, "-") for cell in distinct}
+        cells = [cell.replace(_MINUS, "-") for cell in cells]
+        said.append(f"with {_MINUS} for minus")
+    units = {_unit(cell) for cell in distinct}
     if len(units) == 1 and (unit := units.pop()):
         cells = [_without_unit(cell) for cell in cells]
         said.append("without their percent signs" if unit == "%" else f"without their unit {unit}")
     values = numbers(cells)
     how = ""
     if values is None:
-        decimal = _with_points(cells)
+        decimal = _with_points(cells, decimal_commas=decimal_commas)
         if decimal is None:
             return None
         cells, how = decimal
@@ -239,13 +271,16 @@ def _without_unit(cell: str) -> str:
     return found["number"].strip() if found else cell
 
 
-def _with_points(cells: Sequence[str]) -> tuple[list[str], str] | None:
+def _with_points(cells: Sequence[str], *, decimal_commas: bool) -> tuple[list[str], str] | None:
     """The cells as numbers with decimal points, and how they were read; None where they are not."""
     others = [cell for cell in cells if cell and not is_number(cell)]
-    if all(map(_THOUSANDS.fullmatch, others)):
+    commas = all(map(_DECIMAL_COMMA.fullmatch, others)) and not any(
+        "." in one for one in _plain(cells)
+    )
+    if all(map(_THOUSANDS.fullmatch, others)) and not (commas and decimal_commas):
         dropped = re.compile(_SEPARATORS)
         return [dropped.sub("", cell) for cell in cells], _WITHOUT_SEPARATORS
-    if all(map(_DECIMAL_COMMA.fullmatch, others)) and not any("." in one for one in _plain(cells)):
+    if commas:
         points = [cell.replace(".", "").replace(",", ".") for cell in cells]
         return points, _WITH_COMMAS
     if all(map(_POINTED.fullmatch, others)) and all(map(_MAYBE_POINTED.fullmatch, _filled(cells))):

@@ -19,13 +19,17 @@ from rebt_ros.storage.records import Records
 _TELLING = 200
 
 #: Columns of these names, in any case, number or date the rows.
-_NUMBERING = frozenset({"stamp", "time", "timestamp", "index", "unnamed: 0"})
+_NUMBERING = frozenset({"stamp", "time", "timestamp", "index", "unnamed: 0", "#"})
 #: Columns of these names do where their values rise from every row to the next.
 _COUNTING = re.compile(r"id|nr|no|n|row|step|seq|sequence|frame|tick|.*(?:index|_id)")
 #: Columns of these names do where their values rise or stay: clocks are coarse.
 _DATING = re.compile(r"t|elapsed|.*(?:time|stamp|date|clock)")
 #: Fewer rows do not tell whether values rise.
 FEWEST_RISING = 3
+#: Columns of these names hold a part of a ROS stamp, whatever its values: `header.stamp.nanosec`.
+_PART_OF_STAMP = re.compile(r"(?:.*[._/])?(?:n(?:ano)?secs?|(?:stamp|time)[._/]secs?)")
+#: And columns of these names do where they never fall.
+_SECONDS = frozenset({"sec", "secs"})
 #: What a name may say behind what it is: a unit of time.
 _UNIT_OF_TIME = re.compile(
     r"[ _]*[\[(]?(?:s|secs?|seconds?|m?secs?|[mun]s|n(?:ano)?secs?|utc|unix|epoch)[\])]?\Z"
@@ -75,10 +79,11 @@ def column_names(records: Records, labels: Sequence[str], *, header: bool) -> Co
 def numbers_rows(name: str, cells: Sequence[str]) -> bool:
     """Whether a column numbers or dates the rows, by its name and by its values."""
     plain = name.strip().lower()
-    if plain in _NUMBERING:
+    if plain in _NUMBERING or _PART_OF_STAMP.fullmatch(plain):
         return True
     counts = _COUNTING.fullmatch(plain) is not None
-    if not (counts or _DATING.fullmatch(plain) or _DATING.fullmatch(_UNIT_OF_TIME.sub("", plain))):
+    dates = _DATING.fullmatch(plain) or _DATING.fullmatch(_UNIT_OF_TIME.sub("", plain))
+    if not (counts or dates or plain in _SECONDS):
         return False
     values = numbers([cell.strip() for cell in cells])
     if values is None or len(values) < FEWEST_RISING:
@@ -86,7 +91,9 @@ def numbers_rows(name: str, cells: Sequence[str]) -> bool:
     rises = np.diff(values)
     if counts:
         return bool(np.all(rises > 0))
-    return bool(np.all(rises >= 0)) and 2 * len(np.unique(values)) > len(values)
+    if not np.all(rises >= 0):
+        return False
+    return plain in _SECONDS or 2 * len(np.unique(values)) > len(values)
 
 
 def of_the_actions(names: Sequence[str]) -> int | None:

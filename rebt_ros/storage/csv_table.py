@@ -32,6 +32,7 @@ from rebt_ros.storage.cells import (
     is_maybe_missing,
     is_missing,
     is_number,
+    is_truth,
     numbers,
 )
 from rebt_ros.storage.column_names import (
@@ -49,6 +50,9 @@ STAMP = "stamp"
 #: A column of the label column's name and this says how each action ended: "success" or "failure".
 #: It is no feature, because it is known only afterwards.
 OUTCOME_SUFFIX = ".outcome"
+
+#: Where there are more actions than that, they should recur.
+_MANY_ACTIONS = 20
 
 #: How many column names a message lists.
 _LISTED = 8
@@ -103,7 +107,7 @@ def read_csv(
     read, columns, unreadable = _states(shown, known | left_out, notes)
     taken, label = shown.events()
     actions, chosen = shown.actions(taken, label)
-    notes += _doubts(actions)
+    notes += _doubts(actions, len(taken))
     on_channels, channel = in_sorted_order(table.channels, label)
     return Read(
         Demonstration(
@@ -181,8 +185,8 @@ def _states(
         if place not in table.labels and name not in left_out
     ]
     read = {place: shown.column(place) for place in places}
-    if any(isinstance(value, Column) and value.decimal_commas for value in read.values()):
-        # In a table with decimal commas, points stand between groups of three digits.
+    if _has_decimal_commas(table, list(read.values())):
+        # In such a table, points stand between groups of three digits, and commas do not.
         read = {place: shown.column(place, decimal_commas=True) for place in places}
     found: list[Column] = []
     unreadable = set()
@@ -195,14 +199,24 @@ def _states(
         shown.check_numbers(place, one.values)
         found.append(one)
     if not found:
+        why = [f" ({one.note})" for one in read.values() if isinstance(one, NoFeature)]
         raise InputError(
-            f"{table.path} has no column beside the actions that can be a feature: add one "
-            "per value of the state, separated by commas."
+            f"{table.path} has no column beside the actions that can be a feature"
+            f"{''.join(why[:1])}: add one per value of the state, separated by commas."
         )
     return (
         tuple(one.feature for one in found),
         np.column_stack([one.values for one in found]),
         unreadable,
+    )
+
+
+def _has_decimal_commas(table: _Table, columns: Sequence[Column | NoFeature]) -> bool:
+    """Whether commas are decimal ones, by any column or by what else separates cells."""
+    if any(isinstance(one, Column) and one.decimal_commas for one in columns):
+        return True
+    return table.delimiter == ";" and not any(
+        "." in cell for row in table.rows for cell in row if is_number(cell.strip())
     )
 
 
@@ -227,8 +241,8 @@ def _numbering(
     return frozenset(found)
 
 
-def _doubts(actions: Sequence[str]) -> list[str]:
-    """What a person may not have meant by actions of such names."""
+def _doubts(actions: Sequence[str], events: int) -> list[str]:
+    """What a person may not have meant by actions of such names, or by so many of them."""
     notes = [
         f"{action!r} is taken for an action: leave cells without one empty"
         for action in actions
@@ -237,6 +251,11 @@ def _doubts(actions: Sequence[str]) -> list[str]:
     alike: dict[str, list[str]] = {}
     for action in actions:
         alike.setdefault(" ".join(action.casefold().split()), []).append(action)
+    if len(actions) > _MANY_ACTIONS and 2 * len(actions) > events:
+        notes.append(
+            f"{len(actions)} different actions in {events} rows, such as {actions[0]!r}, hardly "
+            "recur, and each is an action of its own: name the label column if it is another"
+        )
     return notes + [
         f"{', '.join(map(repr, same))} are different actions: write them alike if they are one"
         for same in alike.values()
@@ -258,6 +277,7 @@ class _Table:
     """Whether the first record names the columns."""
     left_out: Counter[NoRow]
     """Other records, by what they are."""
+    delimiter: str
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -344,9 +364,14 @@ def _table(
     _check_names(path, columns)
     for cells, line in zip(records.rows, records.lines, strict=True):
         if len(cells) != len(columns):
+            helps = (
+                "quote cells that contain what separates cells, and remove lines above the names"
+                if len(cells) > len(columns)
+                else "complete the line, or remove it if it was cut off"
+            )
             raise InputError(
                 f"{path}, line {line}: there are {len(cells)} cells where "
-                f"{len(columns)} were expected: quote cells that contain commas."
+                f"{len(columns)} were expected, as on line {records.lines[0]}: {helps}."
             )
     positions: list[int] = []
     for label in labels:
@@ -365,7 +390,14 @@ def _table(
     if not positions:
         positions = [_default_label(columns, rows, notes)]
     return _Table(
-        path, columns, rows, records.lines[said:], tuple(positions), said, records.left_out
+        path,
+        columns,
+        rows,
+        records.lines[said:],
+        tuple(positions),
+        said,
+        records.left_out,
+        records.delimiter,
     )
 
 
@@ -377,14 +409,20 @@ def _default_label(columns: Sequence[str], rows: Sequence[Sequence[str]], notes:
         if named != last:
             notes.append(f"column {columns[named]!r} is taken for the actions because of its name")
         return named
-    if all(is_missing(cell) or is_number(cell) for cell in {row[last].strip() for row in rows}):
-        words = next((place for place in range(last) if _holds_words(rows, place)), None)
-        if words is not None:
-            notes.append(
-                f"column {columns[last]!r} is taken for the actions because it is the last, but "
-                f"holds numbers, and {columns[words]!r} holds words: name the label column if it "
-                "is another"
-            )
+    held = {row[last].strip() for row in rows}
+    if all(is_missing(cell) or is_number(cell) for cell in held):
+        what = "numbers"
+    elif all(is_missing(cell) or is_truth(cell) for cell in held):
+        what = "truths"
+    else:
+        return last
+    words = next((place for place in range(last) if _holds_words(rows, place)), None)
+    if words is not None:
+        notes.append(
+            f"column {columns[last]!r} is taken for the actions because it is the last, but "
+            f"holds {what}, and {columns[words]!r} holds words: name the label column if it "
+            "is another"
+        )
     return last
 
 
@@ -392,7 +430,7 @@ def _holds_words(rows: Sequence[Sequence[str]], place: int) -> bool:
     """Whether a column holds words, and few of them that often recur, as actions do."""
     cells = {row[place].strip() for row in rows}
     words = [cell for cell in cells if not is_missing(cell)]
-    return 2 * len(words) <= len(rows) and not any(map(is_number, words))
+    return 2 * len(words) <= len(rows) and not any(is_number(one) or is_truth(one) for one in words)
 
 
 def _labelled(table: _Table, notes: list[str]) -> list[int]:

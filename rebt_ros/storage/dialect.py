@@ -7,7 +7,7 @@ import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import dropwhile, islice
 
 #: What may separate cells, the usual one first, with its name.
 _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
@@ -84,6 +84,9 @@ def _after_comments(text: str, begin: int) -> int:
 def _last_comment(comments: str, delimiter: str) -> tuple[str, ...]:
     lines = comments.splitlines()
     last = lines[-1].lstrip(COMMENT).strip() if lines else ""
+    if last.startswith(delimiter):
+        # That is what the first column is called: the number of the row.
+        last = COMMENT + last
     try:
         return tuple(next(_first_records(last, delimiter), ()))
     except csv.Error:
@@ -91,14 +94,20 @@ def _last_comment(comments: str, delimiter: str) -> tuple[str, ...]:
 
 
 def _delimiter(text: str) -> str:
-    """The one that gives all records as many cells as the first; commas where none does.
+    """The one that gives all records as many cells as the first.
+
+    Where none does, titles above the table, which have a single cell, do not count; then most
+    records do; and then it is commas.
+
 
     A table with semicolons may have a decimal comma in each cell, so that commas would do as well:
     then there are semicolons in the cells of its first record.
     """
     fitting = [one for one in _DELIMITERS if _fits(text, one)]
     if not fitting:
-        return ","
+        below_titles = [one for one in _DELIMITERS if _fits(text, one, titles=True)]
+        mostly = [one for one in _DELIMITERS if one != " " and _fits_most(text, one)]
+        return next(iter([*below_titles, *mostly, ","]))
     if fitting[0] == ",":
         first = next(_first_records(text, ","))
         others = [one for one in fitting[1:] if one != " " and any(one in cell for cell in first)]
@@ -106,16 +115,28 @@ def _delimiter(text: str) -> str:
     return fitting[0]
 
 
-def _fits(text: str, delimiter: str) -> bool:
+def _fits(text: str, delimiter: str, *, titles: bool = False) -> bool:
+    counts = _counts(text, delimiter)
+    if titles:
+        counts = list(dropwhile(lambda count: count == 1, counts))
+    return len(set(counts)) == 1 and min(counts) > 1
+
+
+def _fits_most(text: str, delimiter: str) -> bool:
+    counts = _counts(text, delimiter)
+    return bool(counts) and counts[0] > 1 and 2 * counts.count(counts[0]) > len(counts)
+
+
+def _counts(text: str, delimiter: str) -> list[int]:
+    """How many cells each of the first records has that is no comment; empty where it cannot be."""
     try:
-        counts = {
+        return [
             len(cells)
             for cells in islice(_first_records(text, delimiter), _FIRST)
             if not cells[0].startswith(COMMENT)
-        }
+        ]
     except csv.Error:
-        return False
-    return len(counts) == 1 and min(counts) > 1
+        return []
 
 
 def _quote(text: str, delimiter: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from array import array
 from collections import Counter
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from enum import Enum
 from pathlib import Path
 
 from rebt_ros.errors import InputError
+from rebt_ros.storage.cells import is_missing, is_number
 from rebt_ros.storage.dialect import COMMENT, Dialect, dialect_of
 from rebt_ros.storage.text import read_text
 
@@ -21,6 +23,9 @@ class NoRow(Enum):
     EMPTY = "is empty", "are empty"
     COMMENT = "is a comment", "are comments"
     NAMES = "repeats the column names", "repeat the column names"
+    TITLE = "is a title", "are titles"
+    UNITS = "says units below the column names", "say units below the column names"
+    RULER = "is a ruled line", "are ruled lines"
 
     def __init__(self, single: str, several: str) -> None:
         self.single = single
@@ -42,6 +47,8 @@ class Records:
     """How many other records there are among and behind them, by what they are."""
     notes: tuple[str, ...]
     """How it is read, where that is not plain; no full stops."""
+    delimiter: str
+    """What separates cells."""
 
     def without(self, cells: Sequence[str]) -> Records:
         """The first record, and those of the others that do not repeat its cells."""
@@ -61,7 +68,19 @@ class Records:
             self.comment,
             self.left_out + Counter({NoRow.NAMES: len(again)}),
             self.notes,
+            self.delimiter,
         )
+
+
+#: Stands between two files that were put one behind the other.
+_BYTE_ORDER_MARK = "\ufeff"
+
+#: How JSON begins that holds objects.
+_JSON = ("{", "[{")
+
+#: A cell of a line that is drawn, as below the names of a table in Markdown.
+_RULED = re.compile(r"(?::?-+:?|=+)?")
+_BRACKETED = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
 
 
 def read_records(path: Path) -> Records:
@@ -70,24 +89,19 @@ def read_records(path: Path) -> Records:
     Raises:
         InputError: The file cannot be read, or holds no table.
     """
-    text = read_text(path)
+    text = read_text(path).replace(_BYTE_ORDER_MARK, "")
+    if text.lstrip().startswith(_JSON):
+        raise InputError(f"{path} is JSON, and no table: name a CSV table, a bag or a recording.")
     dialect = dialect_of(text)
     rows, lines = _parsed(path, text, dialect)
-    kept, left_out = [], Counter[NoRow]()
-    width = len(next((cells for cells in rows if any(map(str.strip, cells))), ()))
-    for place, cells in enumerate(rows):
-        if not any(map(str.strip, cells)):
-            left_out[NoRow.EMPTY] += bool(cells)
-        elif cells[0].startswith(COMMENT) and len(cells) != width:
-            left_out[NoRow.COMMENT] += 1
-        else:
-            kept.append(place)
-    if not kept:
+    filled = [place for place, cells in enumerate(rows) if any(map(str.strip, cells))]
+    if not filled:
         raise InputError(f"{path} is empty: name a table with rows.")
-    rows = [rows[place] for place in kept]
-    if all(len(cells) == len(rows[0]) and not cells[-1].strip() for cells in rows):
-        # Some programs end each line with a separator.
-        rows = [cells[:-1] for cells in rows]
+    reasons = _no_rows([rows[place] for place in filled])
+    kept = [place for place, reason in zip(filled, reasons, strict=True) if reason is None]
+    left_out = Counter(reason for reason in reasons if reason is not None)
+    left_out[NoRow.EMPTY] += sum(map(bool, rows)) - len(filled)
+    rows = _without_blank_ends([rows[place] for place in kept])
     if len(rows[0]) < 2:
         raise InputError(
             f"{path} has a single column: a table needs at least one value of the state and "
@@ -100,7 +114,65 @@ def read_records(path: Path) -> Records:
         dialect.comment,
         +left_out,
         dialect.notes,
+        dialect.delimiter,
     )
+
+
+def _no_rows(records: Sequence[Sequence[str]]) -> list[NoRow | None]:
+    """Why each of the records that hold something is no row; None where it may be one."""
+    titles = _titles(records)
+    width = len(records[titles])
+    numbered = _numbered(records[titles + 1 :])
+    reasons: list[NoRow | None] = [NoRow.TITLE] * titles
+    for place, cells in enumerate(records[titles:]):
+        reason = None
+        if cells[0].startswith(COMMENT) and place and (len(cells) != width or numbered):
+            reason = NoRow.COMMENT
+        elif place and all(_RULED.fullmatch(cell.strip()) for cell in cells):
+            reason = NoRow.RULER
+        elif place == 1 and _says_units(cells):
+            reason = NoRow.UNITS
+        reasons.append(reason)
+    return reasons
+
+
+def _titles(records: Sequence[Sequence[str]]) -> int:
+    """How many records above a table have nothing but their first cell, as titles do."""
+    count = 0
+    while count < len(records) - 2 and not any(map(str.strip, records[count][1:])):
+        count += 1
+    # Below them are names: several, each column with one, over rows of as many cells.
+    names = records[count]
+    below = records[min(count + 1, len(records) - 1)]
+    are_names = len(names) > 1 and all(map(str.strip, names)) and len(below) == len(names)
+    return count if are_names else 0
+
+
+def _numbered(records: Sequence[Sequence[str]]) -> bool:
+    """Whether the first column holds numbers, so that what begins like a comment is one."""
+    cells = {cells[0].strip() for cells in records if not cells[0].startswith(COMMENT)}
+    filled = [cell for cell in cells if not is_missing(cell)]
+    return bool(filled) and all(map(is_number, filled))
+
+
+def _says_units(cells: Sequence[str]) -> bool:
+    """Whether a record below names has brackets around whatever it holds, as around units."""
+    filled = [cell.strip() for cell in cells if not is_missing(cell.strip())]
+    return bool(filled) and all(
+        _BRACKETED.fullmatch(cell) and not is_number(cell[1:-1]) for cell in filled
+    )
+
+
+def _without_blank_ends(rows: Sequence[list[str]]) -> list[list[str]]:
+    """Rows without the blank cells that some programs put behind the last one."""
+    width = len(rows[0])
+    if all(len(cells) == width for cells in rows):
+        while width > 1 and not any(cells[width - 1].strip() for cells in rows):
+            width -= 1
+    return [
+        cells[:width] if len(cells) > width and not any(map(str.strip, cells[width:])) else cells
+        for cells in rows
+    ]
 
 
 def _parsed(path: Path, text: str, dialect: Dialect) -> tuple[list[list[str]], array[int]]:

@@ -7,11 +7,25 @@ from pathlib import Path
 
 from rebt_ros.errors import InputError
 
-_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+#: Encodings by the byte order mark that a file begins with; that of UTF-16 begins UTF-32's.
+_MARKED = (
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+
+#: Encodings without a mark, by which bytes of a pair are 0 in plain words.
+_UNMARKED = ((1, "utf-16-le"), (0, "utf-16-be"))
+
+#: So many bytes tell.
+_TELLING = 64
 
 
 def read_text(path: Path) -> str:
-    """The text of a UTF-8 file, or of a UTF-16 one with a byte order mark, line ends untouched.
+    """The text of a file of UTF-8, UTF-16 or UTF-32, without its byte order mark.
+
+    Line ends are left as they are.
 
     Raises:
         InputError: There is no such file, or it cannot be read as text.
@@ -23,13 +37,24 @@ def read_text(path: Path) -> str:
     except ValueError as err:
         raise InputError(f"{str(path)!r} is no name of a file: check it.") from err
     try:
-        text = data.decode("utf-16" if data.startswith(_UTF_16) else "utf-8-sig")
+        text = data.decode(_encoding(data))
     except UnicodeDecodeError as err:
         line = data.count(b"\n", 0, err.start) + 1
         raise InputError(f"{path}, line {line}: this is not UTF-8 text: save it as UTF-8.") from err
     if "\0" in text:
         raise InputError(f"{path} is not a text file: name a file of another kind.")
     return text
+
+
+def _encoding(data: bytes) -> str:
+    for mark, encoding in _MARKED:
+        if data.startswith(mark):
+            return encoding
+    begin = data[:_TELLING]
+    for place, encoding in _UNMARKED:
+        if begin[place::2] and not any(begin[place::2]) and all(begin[1 - place :: 2]):
+            return encoding
+    return "utf-8-sig"
 
 
 def unreadable(path: Path, err: OSError) -> InputError:

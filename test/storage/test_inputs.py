@@ -108,6 +108,10 @@ def test_a_directory_of_bags_is_each_of_them_and_so_is_one_of_tables(tmp_path):
     [
         (b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
         (b"#ROSBAG V2.0\n\xff", "rosbags-convert --src"),
+        (b"PAR1\x15\0", "Parquet"),
+        (b"\x89HDF\r\n", "HDF5"),
+        (b"\xd0\xcf\x11\xe0\xa1", "old Excel"),
+        (b"BZh91AY", "bunzip2"),
     ],
 )
 @pytest.mark.parametrize("name", ["one.mcap", "one.db3", "one.bag", "one.csv"])

@@ -12,6 +12,7 @@ import pytest
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.errors import InputError
 from rebt_ros.storage.csv_table import read_csv
 from rebt_ros.storage.inputs import load
 from rebt_ros.storage.read import Read
@@ -155,6 +156,54 @@ DIALECTS: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
         ("'action' is taken for the actions",),
     ),
     "no names": (_written(_plain(), None), ("the first line holds data",)),
+    "separators at the ends of rows": (
+        _written([[*row, "", ""] for row in _plain()]),
+        (),
+    ),
+    "separators at the ends of some": (
+        _written([[*row, *[""] * (place % 3)] for place, row in enumerate(_plain())]),
+        (),
+    ),
+    "several separators at the ends": (
+        _written([[*row, "", ""] for row in _plain()], [*NAMES, "", ""]),
+        (),
+    ),
+    "titles": (f"Run 3 from Monday\n\nby hand\n{_written(_plain())}", ("2 lines are titles",)),
+    "a title of a spreadsheet": (f"Run 3,,,,\n{_written(_plain())}", ("1 line is a title",)),
+    "units below the names": (
+        _written([["[m]", "(kg)", "", "-", "[cmd]"], *_plain()]),
+        ("1 line says units below the column names",),
+    ),
+    "ruled lines": (
+        _written([["---"] * 5, *_plain(), ["==="] * 5]),
+        ("2 lines are ruled lines",),
+    ),
+    "a table of Markdown": (
+        "\n".join(f"| {' | '.join(row)} |" for row in [NAMES, [":--:"] * 5, *_plain()]),
+        ("separated by bars", "1 line is a ruled line", "blanks around actions", "'Unnamed: 0'"),
+    ),
+    "files one behind the other": (
+        f"\ufeff{_written(_plain()[:30])}\ufeff{_written(_plain()[30:])}",
+        ("1 line repeats the column names",),
+    ),
+    "a comment that has separators": (
+        _written([*_plain()[:30], ["# a", "b", "c", "d", "e"], *_plain()[30:]]),
+        ("1 line is a comment",),
+    ),
+    "stamps of ROS": (
+        _written(
+            [[str(place // 10), str(place % 10), *row] for place, row in enumerate(_plain())],
+            ["header.stamp.sec", "header.stamp.nanosec", *NAMES],
+        ),
+        ("'header.stamp.nanosec' numbers or dates", "'header.stamp.sec' numbers or dates"),
+    ),
+    "row numbers that are called #": (
+        _written([[str(place), *row] for place, row in enumerate(_plain())], ["#", *NAMES]),
+        ("a line of comments", "what the comment", "'#' numbers or dates"),
+    ),
+    "utf-32": (_written(_plain()).encode("utf-32"), ()),
+    "utf-16 without a mark": (_written(_plain()).encode("utf-16-le"), ()),
+    "utf-16 of another order without a mark": (_written(_plain()).encode("utf-16-be"), ()),
 }
 
 
@@ -189,16 +238,30 @@ def test_however_a_table_is_written_it_is_the_same_demonstration(
     assert not read.account.missing
 
 
+def _decoded(content: str | bytes, dialect: str) -> str:
+    """The text of a table."""
+    if isinstance(content, str):
+        return content.replace("\ufeff", "")
+    for encoding in ("utf-32", "utf-16"):
+        if dialect.startswith(encoding):
+            order = {
+                "utf-16 without a mark": "-le",
+                "utf-16 of another order without a mark": "-be",
+            }
+            return content.decode(encoding + order.get(dialect, ""))
+    return content.decode("utf-8-sig")
+
+
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_each_line_of_a_table_has_a_place_in_its_account(dialect: str, tmp_path: Path) -> None:
-    text, _ = DIALECTS[dialect]
-    if isinstance(text, bytes):
-        text = text.decode("utf-16" if dialect == "utf-16" else "utf-8-sig")
-    read = _read(tmp_path, text)
+    content, _ = DIALECTS[dialect]
+    read = _read(tmp_path, content)
+    text = _decoded(content, dialect)
     before = sum(line.startswith(("#", "sep=")) for line in text.splitlines()[:2])
-    names = dialect not in {"no names", "names in a comment"}
+    empty = text.count("\n\n")
+    names = dialect not in {"no names", "names in a comment", "row numbers that are called #"}
     assert read.account is not None
-    assert read.account.stated == len(text.splitlines()) - before - names
+    assert read.account.stated == len(text.splitlines()) - before - names - empty
     assert read.account.stated == read.account.read + sum(read.account.left_out.values())
 
 
@@ -218,6 +281,8 @@ def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Pat
         (["1e3 m/s", "2.5 m/s"], [1000, 2.5]),
         (["0,5 m", "12 m"], [0.5, 12]),
         (["1.234.567", "312"], [1_234_567, 312]),
+        (["\u22120.5", "0.25"], [-0.5, 0.25]),
+        (["\u22121,5 m", "2 m"], [-1.5, 2]),
     ],
 )
 def test_numbers_are_read_as_people_write_them(
@@ -370,6 +435,76 @@ def test_a_last_column_of_numbers_beside_words_is_noted(tmp_path: Path) -> None:
     read = _read(tmp_path, "do,x,docked\ngo,0.5,1\nturn,0.7,0\ngo,0.5,1\nturn,0.9,0\n")
     assert read.demonstration.actions == ("0", "1")
     assert "'do' holds words" in read.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("names", "rows", "note"),
+    [
+        (
+            "label,x,docked",
+            ["go,1,True", "turn,2,False"] * 4,
+            "it is the last, but holds truths, and",
+        ),
+        ("do,x,docked", ["go,1,1", "turn,2,0"] * 4, "it is the last, but holds numbers, and 'do'"),
+        ("x,y,speed", [f"1,2,0.{place}1" for place in range(100)], "100 different actions in 100"),
+    ],
+)
+def test_a_last_column_that_hardly_holds_actions_is_noted(
+    names: str, rows: list[str], note: str, tmp_path: Path
+) -> None:
+    read = _read(tmp_path, "\n".join([names, *rows]))
+    assert any(note in one for one in read.notes), read.notes
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("x,y,a\n1,2,go\n3,4", "2 cells where 3 were expected, as on line 1: complete the line"),
+        ("Run 3, May\nx,y,a\n1,2,go\n", "remove lines above the names"),
+        ("x;y;a\n1;2;go\n1;2;3;go\n", "quote cells that contain what separates cells"),
+        ('[{"x": 1,\n"action": "go"}]\n', "is JSON, and no table"),
+        ('{"x": 1, "action": "go"}\n', "is JSON, and no table"),
+    ],
+)
+def test_why_something_is_no_table_is_true(text: str, why: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=why):
+        _read(tmp_path, text)
+
+
+def test_colors_and_tags_are_no_comments(tmp_path: Path) -> None:
+    read = _read(tmp_path, "tag,x,a\n#1,1,go\nred,2,turn\n#1,3,go\nred,4,go\n")
+    assert len(read.demonstration) == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "states"),
+    [
+        ("x;y;a\n1,107;0,5;go\n2,212;0,25;turn\n", [[1.107, 0.5], [2.212, 0.25]]),
+        ("x;y;a\n1,107;3;go\n2,212;4;turn\n", [[1.107, 3], [2.212, 4]]),
+        ("x;y;a\n1,107;0.5;go\n2,212;0.25;turn\n", [[1107, 0.5], [2212, 0.25]]),
+        ('x,y,a\n"1,107","0,5",go\n"2,212","0,25",turn\n', [[1.107, 0.5], [2.212, 0.25]]),
+        ('x,y,a\n"1,107",3,go\n"2,212",4,turn\n', [[1107, 3], [2212, 4]]),
+    ],
+)
+def test_a_comma_before_three_digits_is_what_it_is_in_the_rest_of_the_table(
+    text: str, states: list[list[float]], tmp_path: Path
+) -> None:
+    read = _read(tmp_path, text)
+    assert read.demonstration.states.tolist() == states
+    assert any("'x' is read as numbers" in note for note in read.notes)
+
+
+def test_integers_that_are_rounded_are_noted(tmp_path: Path) -> None:
+    read = _read(tmp_path, f"x,y,a\n{2**60 + 1},{2**60},go\n3,4,turn\n")
+    assert [note for note in read.notes if "rounded" in note] == [
+        f"column 'x' holds integers such as {2**60 + 1}, which are rounded"
+    ]
+
+
+def test_why_there_is_no_feature_is_said(tmp_path: Path) -> None:
+    text = "".join(f"1_{place}00,go\n" for place in range(10, 40))
+    with pytest.raises(InputError, match=r"feature \(column 'x' holds 30 different texts"):
+        _read(tmp_path, f"x,a\n{text}")
 
 
 def test_points_part_thousands_where_other_columns_have_decimal_commas(tmp_path: Path) -> None:
