@@ -19,6 +19,7 @@ from rebt_ros.learning.learning import Learning
 from rebt_ros.studio.tree_view import Json, suggestion_views, tree_view
 from rebt_ros.verification.contradictions import agreeing_demands
 from rebt_ros.verification.proof import Answer, check, verdicts
+from rebt_ros.verification.robot_rules import rules_of, together
 from rebt_ros.verification.rules import RuleSet
 from rebt_ros.verification.verdict_text import details
 
@@ -79,7 +80,7 @@ def draft_view(
     Args:
         learning: The policy of the draft.
         published: The tree that is published; None if there is none.
-        rules: What trees must keep; None: nothing.
+        rules: What trees must keep beside the rules of their robot file; None: nothing.
     """
     learned = learning.learned
     return {
@@ -127,10 +128,11 @@ def differences_in_words(published: LearnedTree | None, draft: LearnedTree) -> I
 
 
 def rules_view(learning: Learning, rules: RuleSet | None) -> list[dict[str, Json]]:
-    """Which rules the draft is proven to keep."""
+    """Which rules the draft is proven to keep, those of its robot file among them."""
+    learned = learning.learned
+    rules = together(rules, rules_of(learned.robot))
     if rules is None:
         return []
-    learned = learning.learned
     try:
         demands = agreeing_demands(rules, learned)
         proofs = check(learned, demands, [learning.table])

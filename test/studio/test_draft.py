@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -19,6 +20,7 @@ from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
 from rebt_ros.learning.pipeline import learn_from
 from rebt_ros.logic.conditions import Threshold
+from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.studio import draft
 from rebt_ros.studio.draft import Change, Draft
 from rebt_ros.studio.learning_view import (
@@ -149,6 +151,18 @@ def test_rules_are_proven_or_broken_before_anything_is_published() -> None:
     unknown = draft_view(learned(), None, rules("rules:\n- never: fly\n", "r.yaml"))
     assert unknown["rules"][0]["kept"] is None
     assert "fly" in unknown["rules"][0]["sentence"]
+
+
+def test_rules_of_the_robot_file_are_asked_as_well() -> None:
+    robot = parse_robot_file(
+        "state: {x: /odom.pose.pose.position.x}\nactions: {action: /action.data}\n"
+        "rules:\n- never: go\n  when: x < 0.2\n- never: go\n"
+    )
+    its = learned()
+    learning = replace(its, learned=replace(its.learned, robot=robot))
+    assert [rule["kept"] for rule in draft_view(learning, None, None)["rules"]] == [True, False]
+    same = rules("rules:\n- never: go\n", "rules.yaml")
+    assert [rule["kept"] for rule in draft_view(learning, None, same)["rules"]] == [False, True]
 
 
 def test_levels_recall_and_histograms_are_those_of_what_was_learned() -> None:

@@ -11,6 +11,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.live.last_tick import LastTick
+from rebt_ros.live.tick_explanation import explained
 from rebt_ros.verification.acting import Outcome, commanding, recorded, trace
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
@@ -63,7 +64,7 @@ def test_a_first_tick_is_recorded_as_it_is_traced(
 
 def _told(runtime: TreeRuntime, learned: object, state: tuple[float, ...]) -> list[str]:
     runtime.tick(state)
-    return LastTick(learned, state, runtime.outcomes()).explained().splitlines()
+    return explained(LastTick(learned, state, runtime.outcomes())).splitlines()
 
 
 def test_a_sequence_that_remembers_is_told_from_where_it_goes_on() -> None:
