@@ -80,6 +80,22 @@ class Workbench:
             self._versions_seen = ()
         return learned
 
+    def learn(self, learn: Callable[[], str]) -> str:
+        """Has a tree learned; the board says that it is awaited until it has been read.
+
+        Args:
+            learn: Has it learned and written.
+
+        Raises:
+            RebtError: It was refused.
+        """
+        seen = self._seen
+        message = learn()
+        with self._lock:
+            if self._seen == seen:
+                self._board.update(Section.LEARNING, {"awaited": True})
+        return message
+
     def look(self) -> None:
         """Looks for what was learned or published since; to be called every now and then."""
         with self._lock:
@@ -217,6 +233,7 @@ class Workbench:
         if seen == self._seen:
             return
         self._seen = seen
+        self._board.update(Section.LEARNING, {"awaited": True})
         try:
             learning = load_learning(path)
         except InputError as err:

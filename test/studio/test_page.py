@@ -581,6 +581,10 @@ def test_learning_shows_how_far_it_is_and_can_be_cancelled(
     asked("cancel")
     studio.board.update(Section.NODES, {"learner": node("idle", stage="idle")})
     page.until(lambda: not page.one("#learn-progress").is_displayed())
+    studio.board.update(Section.LEARNING, {"awaited": True})
+    page.sees("Its sizes are on their way", "#learn-stage")
+    studio.board.update(Section.LEARNING, {"awaited": None})
+    page.until(lambda: not page.one("#learn-progress").is_displayed())
 
 
 def test_a_size_is_chosen_on_the_chart_and_in_the_list(page: Browser, asked: Any) -> None:

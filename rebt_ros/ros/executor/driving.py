@@ -157,9 +157,10 @@ class Driving:
         self._channels.begin_tick()
         state = program.inputs.state()
         commands = program.runtime.tick(state).commands
+        self.commands += self._channels.send(commands)
+        # The robot waits for its command, and nobody for this.
         self.last_tick = LastTick(program.learned, tuple(state), program.runtime.outcomes())
         self.ticks += 1
-        self.commands += self._channels.send(commands)
         self.longest = max(self.longest, time.perf_counter() - began)
 
     def set_back(self) -> None:

@@ -144,7 +144,9 @@ class StudioNode(Node):
         return {
             "enable": lambda asked: calls.switch(f"{settings.executor}/enable", asked.flag("on")),
             "act": self._act,
-            "learn": lambda _: calls.trigger(f"{settings.learner}/relearn", None),
+            "learn": lambda _: self._workbench.learn(
+                lambda: calls.trigger(f"{settings.learner}/relearn", None)
+            ),
             "cancel": lambda _: calls.trigger(f"{settings.learner}/cancel"),
             "rollback": lambda _: calls.trigger(f"{settings.learner}/rollback"),
             "ping": lambda _: "",

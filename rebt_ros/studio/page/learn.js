@@ -33,7 +33,7 @@ export class Learn {
   }
 
   render(changed) {
-    if (changed.has("nodes") || changed.has("demonstrations")) this.progress();
+    if (["nodes", "demonstrations", "learning"].some((one) => changed.has(one))) this.progress();
     const learning = this.state.get("learning");
     const draft = this.state.get("draft");
     const hasLevels = (learning.levels ?? []).length > 0;
@@ -74,7 +74,12 @@ export class Learn {
     setText(byId("learn-from"), words);
     show(byId("learn-cancel"), works);
     byId("learn-rollback").disabled = !isThere || works;
-    show(byId("learn-progress"), works);
+    const awaited = !works && this.state.get("learning").awaited === true;
+    show(byId("learn-progress"), works || awaited);
+    if (awaited) {
+      byId("learn-bar").removeAttribute("value");
+      setText(byId("learn-stage"), "The tree is learned. Its sizes are on their way…");
+    }
     if (works) {
       byId("learn-bar").value = stage === "idle" ? 0 : share;
       setText(byId("learn-stage"), stage === "idle" ? "Starting…" : `${sentence(stage)} ${share} %`);
