@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo studio test bench bench-driving bench-recorder experiment fuzz soak lint format clean
+.PHONY: help setup build demo studio test bench bench-driving bench-recorder bench-scale experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -68,6 +68,9 @@ bench: setup ## Measure us and the limit in turn, for docs/performance.md (ARGS=
 
 bench-driving: setup ## Let what is learned drive, beside plain learners (ARGS="corrections", "--late 2", ...).
 	@PYTHONPATH=.:test/benchmarks:$$PYTHONPATH $(VENV_PYTHON) -m driving $(ARGS)
+
+bench-scale: setup ## Read many bags once, killed and in parallel (ARGS="--bags 10000"), for docs/scale.md.
+	@PYTHONPATH=.:test:test/benchmarks:$$PYTHONPATH $(VENV_PYTHON) test/benchmarks/scale.py $(ARGS)
 
 bench-recorder: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 bench-recorder: setup ## Kill, load and measure the recorder (KILLS=50; ARGS="..." for options).

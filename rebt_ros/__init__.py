@@ -64,11 +64,12 @@ if TYPE_CHECKING:
     from rebt_ros.offline.result import OfflineLearning
     from rebt_ros.robot_file.robot_file import RobotFile
     from rebt_ros.storage.account import Account
-    from rebt_ros.storage.inputs import InputOptions
+    from rebt_ros.storage.input_options import Aside, InputOptions, ReadingPlan
 
 __all__ = [
     "Account",
     "Action",
+    "Aside",
     "ChannelProvenance",
     "Condition",
     "Decision",
@@ -101,6 +102,7 @@ __all__ = [
     "Progress",
     "Provenance",
     "PsaChoice",
+    "ReadingPlan",
     "RebtError",
     "Reductions",
     "Repeater",
@@ -130,6 +132,7 @@ __all__ = [
 _HOMES = {
     "Account": "rebt_ros.storage.account",
     "Action": "rebt_ros.behavior_tree.nodes",
+    "Aside": "rebt_ros.storage.input_options",
     "ChannelProvenance": "rebt_ros.behavior_tree.learned_tree",
     "Condition": "rebt_ros.behavior_tree.nodes",
     "Decision": "rebt_ros.learning.policy",
@@ -142,7 +145,7 @@ _HOMES = {
     "HasCategory": "rebt_ros.logic.conditions",
     "History": "rebt_ros.demonstration.last_action",
     "InputError": "rebt_ros.errors",
-    "InputOptions": "rebt_ros.storage.inputs",
+    "InputOptions": "rebt_ros.storage.input_options",
     "Interval": "rebt_ros.logic.conditions",
     "Inverter": "rebt_ros.behavior_tree.nodes",
     "IsTrue": "rebt_ros.logic.conditions",
@@ -162,6 +165,7 @@ _HOMES = {
     "Progress": "rebt_ros.learning.progress",
     "Provenance": "rebt_ros.behavior_tree.learned_tree",
     "PsaChoice": "rebt_ros.learning.options",
+    "ReadingPlan": "rebt_ros.storage.input_options",
     "RebtError": "rebt_ros.errors",
     "Reductions": "rebt_ros.beyond_the_paper.reductions",
     "Repeater": "rebt_ros.behavior_tree.nodes",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import prompt_answers
@@ -36,6 +37,14 @@ settings.register_profile(
 )
 settings.register_profile("search", settings.get_profile("rebt_ros"), derandomize=False)
 settings.load_profile("rebt_ros")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def cache_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Keeps what commands read out of the user's cache; pictures keep the fonts that they know."""
+    fonts = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"), "matplotlib")
+    os.environ.setdefault("MPLCONFIGDIR", str(fonts))
+    os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
 
 
 # Their imports wait, because the tests of the core run without ROS.

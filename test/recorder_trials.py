@@ -23,7 +23,8 @@ from std_msgs.msg import String
 
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.storage.recording import RecordingWriter, is_recording, read_recording
+from rebt_ros.storage.recording import RecordingWriter, read_recording
+from rebt_ros.storage.recording_files import is_recording
 from rebt_ros.storage.recording_rows import record_type
 from rebt_ros.storage.tree_file import write_tree
 

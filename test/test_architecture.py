@@ -37,7 +37,7 @@ LAYERS: Final = (
     {"behavior_tree"},
     {"robot_file"},
     {"demonstration"},
-    {"logic", "message_path"},
+    {"logic", "message_path", "workers"},
     {"errors", "arrays", "streams", "codec"},
 )
 DEPTH: Final = {unit: depth for depth, units in enumerate(LAYERS) for unit in units}
@@ -69,10 +69,10 @@ ROS_HOMES: Final = ("rebt_ros.ros", "rebt_ros.ros.*", "rebt_ros.commands.demo*")
 HOMES: Final = {
     "aiohttp": ("rebt_ros.ros.studio.server",),
     "apsw": ("rebt_ros.storage.bag_safety",),
-    "distributed": ("rebt_ros.study.workers",),
+    "distributed": ("rebt_ros.workers",),
     "imblearn": ("rebt_ros.decision_tree.svm_smote",),
     "jsonschema": (),
-    "joblib": ("rebt_ros.commands.bench_*", "rebt_ros.study.workers"),
+    "joblib": ("rebt_ros.commands.bench_*", "rebt_ros.workers"),
     "matplotlib": ("rebt_ros.drawing.*",),
     "networkx": ("rebt_ros.paper.lat_*", "rebt_ros.study.edit_distance.networkx_worker"),
     "py_trees": (

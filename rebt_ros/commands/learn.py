@@ -406,7 +406,7 @@ def _learn(parsed: argparse.Namespace) -> None:
             parsed.inputs,
             out=parsed.out,
             options=_options(parsed),
-            reading=input_options(parsed),
+            reading=input_options(parsed, progress),
             declared=_declared(parsed),
             levels=parsed.levels,
             most_levels=parsed.most_levels,

@@ -9,12 +9,14 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from rebt_ros import streams
+from rebt_ros.commands.progress import ProgressBar
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.errors import RebtError
 from rebt_ros.robot_file.reading import read_robot_file
 from rebt_ros.robot_file.robot_file import RobotFile
-from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.storage.input_options import Aside, InputOptions, ReadingPlan
+from rebt_ros.storage.read_cache import default_cache
 from rebt_ros.verification.robot_rules import rules_of
 
 #: Exit codes of a failure that the user can mend, and of Ctrl-C (128 + SIGINT).
@@ -91,8 +93,9 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
         nargs="+" if required else "*",
         type=Path,
         metavar="INPUT",
-        help="a rosbag2 bag (directory, .mcap or .db3), a recording of the recorder or a "
-        "directory of them, or a CSV table",
+        help="a rosbag2 bag (directory, .mcap or .db3), a recording of the recorder, a CSV table, "
+        "a directory of any of them, a pattern such as 'fleet/*', or @FILE with such an input in "
+        "each line",
     )
     tables = parser.add_argument_group("CSV tables")
     tables.add_argument(
@@ -146,6 +149,39 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
     bags.add_argument(
         "--skip-bad", action="store_true", help="leave out malformed messages instead of refusing"
     )
+    _add_plan(parser)
+
+
+def _add_plan(parser: argparse.ArgumentParser) -> None:
+    """Adds by which means inputs are read."""
+    many = parser.add_argument_group("many inputs (docs/scale.md)")
+    cache = many.add_mutually_exclusive_group()
+    cache.add_argument(
+        "--cache",
+        type=directory,
+        metavar="DIR",
+        help="keep what is read of each input there, so that only what is new is read the next "
+        "time (default: rebt_ros in the user's cache, $XDG_CACHE_HOME or ~/.cache)",
+    )
+    cache.add_argument("--no-cache", action="store_true", help="read everything, and keep nothing")
+    many.add_argument(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help="processes that read; -1: one per processor (default: one per processor where that "
+        "pays)",
+    )
+    many.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="let the workers of the Dask cluster with this scheduler read, such as "
+        "tcp://127.0.0.1:8786; they need the same paths, and the package distributed",
+    )
+    many.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse an input that cannot be read, instead of setting it aside where others can",
+    )
 
 
 def _robot_file(path: Path) -> RobotFile:
@@ -155,8 +191,10 @@ def _robot_file(path: Path) -> RobotFile:
     return robot
 
 
-def input_options(arguments: argparse.Namespace) -> InputOptions:
-    """The options that `add_input_options` added."""
+def input_options(
+    arguments: argparse.Namespace, progress: ProgressBar | None = None
+) -> InputOptions:
+    """The options that `add_input_options` added; the bar shows how far the reading is."""
     return InputOptions(
         labels=tuple(arguments.label),
         header=not arguments.no_header,
@@ -166,7 +204,24 @@ def input_options(arguments: argparse.Namespace) -> InputOptions:
         sample_rate=arguments.sample_rate,
         skip_bad=arguments.skip_bad,
         robot=_robot_file(arguments.robot) if arguments.robot else None,
+        plan=ReadingPlan(
+            cache=None if arguments.no_cache else arguments.cache or default_cache(),
+            jobs=arguments.jobs,
+            scheduler=arguments.scheduler,
+            strict=arguments.strict,
+            progress=progress or ProgressBar(),
+            tell=_tell,
+        ),
     )
+
+
+def _tell(aside: tuple[Aside, ...]) -> None:
+    """Says what was set aside."""
+    what = "1 input" if len(aside) == 1 else f"{len(aside)} inputs"
+    print(f"set aside {what} that cannot be read (--strict refuses such):", file=sys.stderr)
+    for one in aside:
+        reason = "" if str(one.path) in one.reason else f"{one.path}: "
+        print(f"  {reason}{one.reason}", file=sys.stderr)
 
 
 def _state_topic(text: str) -> StateTopic:

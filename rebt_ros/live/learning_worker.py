@@ -151,7 +151,8 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
     from rebt_ros.learning import pipeline
     from rebt_ros.learning.options import LearnOptions
     from rebt_ros.offline.result import OfflineLearning
-    from rebt_ros.storage.recording import read_recording, recordings
+    from rebt_ros.storage.recording import read_recording
+    from rebt_ros.storage.recording_files import recordings
 
     twice = set(request.binary_features) & set(request.categorical_features)
     if twice:

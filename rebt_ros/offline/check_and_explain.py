@@ -15,7 +15,7 @@ from rebt_ros.errors import OptionError
 from rebt_ros.learning.replaying import rows_for
 from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.offline.trees_and_rows import as_learned_tree, demonstrations_for
-from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.storage.input_options import InputOptions
 from rebt_ros.verification.comparing import Comparison, compare
 from rebt_ros.verification.contradictions import agreeing_demands
 from rebt_ros.verification.explaining import Explanation

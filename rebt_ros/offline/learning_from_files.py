@@ -31,7 +31,8 @@ from rebt_ros.offline.level_files import (
 from rebt_ros.offline.result import OfflineLearning, write_summary
 from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.storage.atomic import write_text_atomically
-from rebt_ros.storage.inputs import InputOptions, as_paths, load
+from rebt_ros.storage.input_options import InputOptions
+from rebt_ros.storage.inputs import as_paths, load
 from rebt_ros.storage.tree_file import write_tree
 from rebt_ros.verification.errors import BrokenRuleError, RuleError
 from rebt_ros.verification.rules import RuleSet
@@ -105,7 +106,7 @@ def learn(
         kept = _ruled(learned, asked, loaded.demonstrations, repair)
         learned, proven = kept.learned, kept.rules
     notes = (*loaded.notes, *further, *_not_on_a_robot(learned))
-    result = OfflineLearning(learned, learnings, notes, loaded.accounts, proven)
+    result = OfflineLearning(learned, learnings, notes, loaded.accounts, proven, aside=loaded.aside)
     if out is not None:
         writing = _part(progress, _LEARNING_SHARE, 1.0)
         most = most_levels if levels else 0

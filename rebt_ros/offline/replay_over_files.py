@@ -9,7 +9,7 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.learning.replaying import Replay
 from rebt_ros.learning.replaying import replay as replay_demonstrations
 from rebt_ros.offline.trees_and_rows import as_learned_tree, demonstrations_for
-from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.storage.input_options import InputOptions
 
 
 def replay(

@@ -17,6 +17,7 @@ from rebt_ros.learning.options import LearnOptions
 from rebt_ros.logic.conditions import Interval
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.input_options import Aside
 from rebt_ros.storage.versions import versions
 
 #: Packages whose versions can change a result.
@@ -37,6 +38,8 @@ class OfflineLearning:
     """Where what each demonstration's file holds went."""
     rules: tuple[str, ...] = ()
     """The rules that the tree was proven to keep, each in a line."""
+    aside: tuple[Aside, ...] = ()
+    """Inputs that could not be read, and were left out."""
 
 
 def write_summary(
@@ -46,6 +49,7 @@ def write_summary(
     summary = summarize(result) | {
         "inputs": list(inputs),
         "accounts": {name: account.as_json() for name, account in result.accounts.items()},
+        "set_aside": [{"path": str(aside.path), "reason": aside.reason} for aside in result.aside],
         "notes": list(result.notes),
         "random_state": options.random_state,
         "upsample": options.upsample.value,

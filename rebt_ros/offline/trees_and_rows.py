@@ -9,7 +9,8 @@ from pathlib import Path
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.demonstration import Demonstration
-from rebt_ros.storage.inputs import InputOptions, as_paths, holds_bags, load
+from rebt_ros.storage.input_options import InputOptions
+from rebt_ros.storage.inputs import as_paths, holds_bags, load
 from rebt_ros.storage.tree_file import read_tree
 
 

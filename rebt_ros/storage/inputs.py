@@ -5,50 +5,22 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from pathlib import Path
 
-from rebt_ros.demonstration.builder import StateTopic
-from rebt_ros.demonstration.demonstration import Demonstration, RowKind
-from rebt_ros.errors import InputError, OptionError
+from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.errors import InputError, OptionError, RebtError
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.bag import read_bag
-from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
-from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.column_names import FEWEST_RISING
 from rebt_ros.storage.csv_table import read_csv
+from rebt_ros.storage.gathering import Gathered, Reading, gather
+from rebt_ros.storage.input_options import Aside, InputKind, InputOptions, Source
 from rebt_ros.storage.read import Read
-from rebt_ros.storage.recording import SUFFIX, is_recording, read_recording, recordings
+from rebt_ros.storage.recording import read_recording
+from rebt_ros.storage.recording_files import SUFFIX, is_recording
 from rebt_ros.storage.robot_bag import read_robot_bag
-from rebt_ros.storage.text import unreadable
-
-
-@dataclass(frozen=True, slots=True)
-class InputOptions:
-    """How to read inputs; `read_csv` and `read_bag` say more about each."""
-
-    labels: tuple[str, ...] = ()
-    """Of CSV tables, the columns that hold the actions; by default the last column."""
-    header: bool = True
-    """Of CSV tables: whether the first line names the columns."""
-    row_kind: RowKind | None = None
-    """Of CSV tables, what a row is; None to tell by the columns."""
-    features: frozenset[str] = frozenset()
-    """Of CSV tables, columns that are features even where their names say that they number or date
-    the rows."""
-    channels: tuple[str, ...] = ()
-    """Of CSV tables that have all of these columns, the labels where `labels` names none."""
-    state_topics: tuple[StateTopic, ...] = ()
-    """Of bags, the topics of the state; by default the only one of numbers."""
-    action_topics: tuple[str, ...] = ()
-    """Of bags, the topics of the actions; by default the only one of texts."""
-    sample_rate: float | None = None
-    """Of bags, rows per second and channel while an action holds; None for a row per action."""
-    skip_bad: bool = False
-    """Of bags: whether messages that cannot be used are left out, instead of the bag refused."""
-    robot: RobotFile | None = None
-    """Of bags, where features and actions are in messages of any type, instead of topics."""
+from rebt_ros.storage.sources import Strange, sources_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,18 +35,8 @@ class Loaded:
     """Where what each demonstration's file holds went, by the same names."""
     robot: RobotFile | None = None
     """Where features and actions are in messages, as the first file has it that says so."""
-
-
-#: Suffixes of tables, in lower case.
-_TABLES = frozenset({".csv", ".tsv"})
-
-
-class InputKind(Enum):
-    """What a file, or a directory that is one demonstration, is."""
-
-    TABLE = "CSV table"
-    RECORDING = "recording"
-    BAG = "bag"
+    aside: tuple[Aside, ...] = ()
+    """What could not be read, in the order of the inputs."""
 
 
 def as_paths(inputs: Sequence[str | Path] | str | Path) -> tuple[Path, ...]:
@@ -86,43 +48,63 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     """Reads demonstrations.
 
     Args:
-        inputs: Bags (directories, .mcap or .db3 files), recordings, CSV tables, and directories of
-            any of them.
+        inputs: Bags (directories, .mcap or .db3 files), recordings, CSV tables, directories of
+            any of them, patterns such as `fleet/*`, and lists of all those, such as `@list.txt`.
         options: How to read them.
 
     Returns:
         All demonstrations, in the order of the inputs; those of a directory oldest first.
 
     Raises:
-        InputError: There is no input, one is there twice, or one cannot be read.
+        InputError: There is no input, one is there twice, or one cannot be read; if the plan is
+            not strict, none can be read.
         OptionError: An option is for a kind of input that none is of.
+        WorkerError: What reads elsewhere does not work.
     """
     options = options or InputOptions()
-    if not inputs:
-        raise InputError("there is no input: name a bag, a recording or a CSV table.")
-    sources = [source for path in inputs for source in _readable_sources(path)]
-    _check_distinct([path for path, _ in sources])
-    _check_options(options, {kind for _, kind in sources})
-    reads = _with_common_features(_read(sources, options))
-    names = _names([path for path, _ in sources], reads)
+    sources = sources_of(inputs, strict=options.plan.strict)
+    readable = [one for one in sources if isinstance(one, Source)]
+    _check_options(options, {source.kind for source in readable})
+    strange = {one.path: one.error for one in sources if isinstance(one, Strange)}
+    gathered = _gathered(readable, options)
+    errors = strange | {
+        source.path: answer
+        for source, answer in zip(readable, gathered.found, strict=True)
+        if isinstance(answer, RebtError)
+    }
+    aside = _aside([one.path for one in sources if one.path in errors], errors, len(sources))
+    there = [
+        (source.path, answer)
+        for source, answer in zip(readable, gathered.found, strict=True)
+        if isinstance(answer, Read)
+    ]
+    if aside:
+        options.plan.tell(aside)
+    reads = _with_common_features([read for _, read in there])
+    names = _names([path for path, _ in there], reads)
     return Loaded(
         tuple(read.demonstration for read in reads),
-        tuple(
-            f"{name}: {note}"
-            for name, read in zip(names, reads, strict=True)
-            for note in (*read.notes, *(read.account.notes() if read.account else ()))
+        (
+            *_notes_on_cache(gathered, options),
+            *(
+                f"{name}: {note}"
+                for name, read in zip(names, reads, strict=True)
+                for note in (*read.notes, *(read.account.notes() if read.account else ()))
+            ),
         ),
         {name: read.account for name, read in zip(names, reads, strict=True) if read.account},
         next((read.robot for read in reads if read.robot is not None), None),
+        aside,
     )
 
 
-def _read(sources: Sequence[tuple[Path, InputKind]], options: InputOptions) -> list[Read]:
+def _gathered(sources: Sequence[Source], options: InputOptions) -> Gathered:
     """Reads them all; a column that numbers the rows of some tables only is a feature of all.
 
     What is called `row` may be where a robot is, and happen to rise all the way in a table.
     """
-    reads = [_READERS[kind](path, options) for path, kind in sources]
+    gathered = gather(sources, _READING, options)
+    reads = [one for one in gathered.found if isinstance(one, Read)]
     measured = {
         feature.name
         for demonstration in (read.demonstration for read in reads)
@@ -130,11 +112,44 @@ def _read(sources: Sequence[tuple[Path, InputKind]], options: InputOptions) -> l
         for feature in demonstration.features
     }
     asked_for = measured & frozenset[str]().union(*(read.no_features for read in reads))
+    if not asked_for:
+        return gathered
     options = replace(options, features=options.features | asked_for)
-    return [
-        _READERS[kind](path, options) if asked_for & read.no_features else read
-        for (path, kind), read in zip(sources, reads, strict=True)
+    found = list(gathered.found)
+    again = [
+        place
+        for place, one in enumerate(found)
+        if isinstance(one, Read) and asked_for & one.no_features
     ]
+    second = gather([sources[place] for place in again], _READING, options)
+    for place, one in zip(again, second.found, strict=True):
+        found[place] = one
+    return Gathered(tuple(found), gathered.unwritable or second.unwritable)
+
+
+def _aside(
+    paths: Sequence[Path], errors: Mapping[Path, RebtError], inputs: int
+) -> tuple[Aside, ...]:
+    """What is set aside, in the order of the inputs.
+
+    Raises:
+        RebtError: Nothing else is there.
+    """
+    if paths and len(paths) == inputs:
+        first = errors[paths[0]]
+        if inputs == 1:
+            raise first
+        raise InputError(f"none of {inputs} inputs can be read; the first: {first}") from first
+    return tuple(Aside(path, str(errors[path])) for path in paths)
+
+
+def _notes_on_cache(gathered: Gathered, options: InputOptions) -> Iterator[str]:
+    if gathered.unwritable:
+        yield (
+            f"what was read cannot be kept in {options.plan.cache} ({gathered.unwritable}): it is "
+            "read anew the next time, unless --cache names a directory with room where you may "
+            "write"
+        )
 
 
 def _names(paths: Sequence[Path], reads: Sequence[Read]) -> list[str]:
@@ -172,77 +187,10 @@ def holds_bags(inputs: Sequence[Path]) -> bool:
     """Whether one of the inputs is a bag.
 
     Raises:
-        InputError: One cannot be read.
+        InputError: One is not there.
     """
-    return any(kind is InputKind.BAG for path in inputs for _, kind in _readable_sources(path))
-
-
-def _readable_sources(path: Path) -> tuple[tuple[Path, InputKind], ...]:
-    try:
-        return tuple(_sources(path))
-    except OSError as err:
-        raise unreadable(path, err) from err
-
-
-def _sources(path: Path) -> Iterator[tuple[Path, InputKind]]:
-    """The demonstrations that an input stands for."""
-    if not path.exists():
-        raise InputError(f"{path} does not exist: name a bag, a recording or a CSV table.")
-    if path.is_dir():
-        yield from [(path, InputKind.BAG)] if is_bag(path) else _within(path)
-    elif path.name == METADATA:
-        yield path.absolute().parent, InputKind.BAG
-    else:
-        yield path, _kind_of(path)
-
-
-def _within(directory: Path) -> Iterator[tuple[Path, InputKind]]:
-    """The demonstrations in a directory that is no bag: recordings, bags or tables."""
-    inside = sorted(directory.iterdir())
-    bags = [path for path in inside if path.is_dir() and is_bag(path)]
-    recorded = (
-        path for path in inside if path.suffix == SUFFIX and path.is_file() and is_recording(path)
-    )
-    if first := next(recorded, None):
-        if bags:
-            raise InputError(
-                f"{directory} holds bags and recordings ({bags[0].name}, {first.name}): name those "
-                "to read."
-            )
-        yield from ((recording, InputKind.RECORDING) for recording in recordings(directory))
-        return
-    tables = [path for path in inside if _has_table_suffix(path) and path.is_file()]
-    if not bags and not tables:
-        yield from ((recording, InputKind.RECORDING) for recording in recordings(directory))
-        return
-    if bags and tables:
-        raise InputError(
-            f"{directory} holds bags and tables ({bags[0].name}, {tables[0].name}): name those to "
-            "read."
-        )
-    yield from ((bag, InputKind.BAG) for bag in bags)
-    yield from ((table, InputKind.TABLE) for table in tables)
-
-
-def _kind_of(file: Path) -> InputKind:
-    refuse_strangers(file)
-    if holds_messages(file):
-        return InputKind.BAG
-    if _has_table_suffix(file) or not is_recording(file):
-        return InputKind.TABLE
-    return InputKind.RECORDING
-
-
-def _has_table_suffix(file: Path) -> bool:
-    return file.suffix.lower() in _TABLES
-
-
-def _check_distinct(paths: Sequence[Path]) -> None:
-    seen: set[Path] = set()
-    for path in paths:
-        if path.resolve() in seen:
-            raise InputError(f"{path} is given twice: name every demonstration once.")
-        seen.add(path.resolve())
+    found = sources_of(inputs, strict=False)
+    return any(isinstance(one, Source) and one.kind is InputKind.BAG for one in found)
 
 
 def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
@@ -266,6 +214,25 @@ def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
             "the options name a robot file, which says what the topics are, and topics beside it: "
             "leave those out."
         )
+
+
+def _read_source(source: Source, options: InputOptions) -> Read:
+    """Reads an input; whatever is wrong with it is a `RebtError`."""
+    return _READERS[source.kind](source.path, options)
+
+
+def _deciding_options(kind: InputKind, options: InputOptions) -> tuple[object, ...]:
+    """The options that decide what is read of an input of some kind, in plain values."""
+    if kind is InputKind.TABLE:
+        row_kind = options.row_kind.value if options.row_kind else None
+        features = sorted(options.features)
+        return (options.labels, options.channels, options.header, row_kind, features)
+    if kind is InputKind.RECORDING:
+        return ()
+    robot = options.robot
+    topics = tuple((topic.name, topic.fields) for topic in options.state_topics)
+    described = None if robot is None else (robot.name, repr(robot), robot.content)
+    return (topics, options.action_topics, options.sample_rate, options.skip_bad, described)
 
 
 def _table(path: Path, options: InputOptions) -> Read:
@@ -307,3 +274,6 @@ _READERS: dict[InputKind, Callable[[Path, InputOptions], Read]] = {
     InputKind.RECORDING: _recording,
     InputKind.BAG: _bag,
 }
+
+
+_READING = Reading(_read_source, _deciding_options)

@@ -21,21 +21,13 @@ from rebt_ros.demonstration.builder import LARGEST_VALUE, is_label
 from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.errors import InputError
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.atomic import StorageError, sync_directory
 from rebt_ros.storage.read import Read
-from rebt_ros.storage.recording_head import (
-    LONGEST_LINE,
-    MARK,
-    Origin,
-    head_line,
-    read_head,
-)
+from rebt_ros.storage.recording_files import SUFFIX
+from rebt_ros.storage.recording_head import Origin, head_line, read_head
 from rebt_ros.storage.recording_rows import RowEncoder, read_rows
 from rebt_ros.storage.text import unreadable
-
-SUFFIX: Final = ".rec"
 
 #: Follows the name of a recording that is kept, but not learned from.
 ASIDE: Final = ".failed"
@@ -249,38 +241,6 @@ class RecordingWriter:
             f"{self.path} cannot be written ({reason}): make room and record again; "
             f"its first {self.rows} rows are kept."
         )
-
-
-def recordings(directory: Path) -> tuple[Path, ...]:
-    """The recordings in a directory, oldest first; other files are passed over.
-
-    Raises:
-        InputError: There is no such directory, or there is no recording in it.
-    """
-    try:
-        files = sorted(
-            path for path in directory.iterdir() if path.suffix == SUFFIX and path.is_file()
-        )
-    except NotADirectoryError as err:
-        raise InputError(f"{directory} is not a directory: name one with recordings.") from err
-    except OSError as err:
-        raise unreadable(directory, err) from err
-    found = tuple(file for file in files if is_recording(file))
-    if not found:
-        raise InputError(f"{directory} holds no recordings: record a demonstration first.")
-    return found
-
-
-def is_recording(path: Path) -> bool:
-    """Whether a file begins like a recording.
-
-    One whose recorder was killed before it had written what comes before the rows does not.
-    """
-    try:
-        with path.open("rb") as file:
-            return file.read(len(MARK)) == MARK and file.readline(LONGEST_LINE).endswith(b"\n")
-    except OSError:
-        return False
 
 
 def read_recording(path: Path) -> Read:

@@ -24,16 +24,11 @@ from rebt_ros.errors import InputError
 from rebt_ros.robot_file.errors import RobotFileError
 from rebt_ros.robot_file.reading import CarriedRobotFile
 from rebt_ros.robot_file.robot_file import RobotFile
+from rebt_ros.storage.recording_files import LONGEST_LINE, MARK
 
 VERSION: Final = 2
 #: The same by a robot file: values may be missing, and features hold categories or texts.
 ROBOT_VERSION: Final = 3
-
-#: What every recording begins with.
-MARK: Final = b"# rebt_ros recording "
-
-#: Longer first lines are refused, so that a file that is no recording is not read as a whole.
-LONGEST_LINE: Final = 1 << 24
 
 #: The rows begin at a multiple of this many bytes.
 _ALIGNMENT: Final = 64

@@ -9,7 +9,8 @@ from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import OptionError
-from rebt_ros.storage.recording import SUFFIX, RecordingError, RecordingWriter, read_recording
+from rebt_ros.storage.recording import RecordingError, RecordingWriter, read_recording
+from rebt_ros.storage.recording_files import SUFFIX
 from rebt_ros.storage.recording_head import Head, read_head
 
 

@@ -21,7 +21,8 @@ from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.storage.atomic import StorageError
-from rebt_ros.storage.recording import ASIDE, SUFFIX, is_recording, read_recording
+from rebt_ros.storage.recording import ASIDE, read_recording
+from rebt_ros.storage.recording_files import SUFFIX, is_recording
 from rebt_ros.storage.recording_head import Origin, read_head
 from rebt_ros.storage.recording_parts import write_part
 from rebt_ros.studio.tree_view import Json

@@ -22,7 +22,7 @@ from rebt_ros.study.report import ExperimentReport, report_csv, report_json, rep
 from rebt_ros.study.result_files import ResultFiles
 from rebt_ros.study.running import attempt
 from rebt_ros.study.settings import Settings
-from rebt_ros.study.workers import run_all
+from rebt_ros.workers import run_all
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def run_experiment(
     finished = [result for result in kept.values() if result is not None]
     missing = [config for config in configs if kept[config.name] is None]
     failed: list[Lost] = list(lost)
-    for result in run_all(missing, settings, attempt, jobs, scheduler):
+    for result in run_all(attempt, [(config, settings) for config in missing], jobs, scheduler):
         if isinstance(result, Lost):
             failed.append(result)
         else:

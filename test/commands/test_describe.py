@@ -22,7 +22,7 @@ from rebt_ros.robot_file.reading import parse_robot_file, read_robot_file
 from rebt_ros.robot_file.survey import MOST_FIELDS, TopicSurvey
 from rebt_ros.ros.message_types import installed
 from rebt_ros.storage.bag_survey import survey_bag
-from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.storage.input_options import InputOptions
 
 
 def _describe(*arguments: object, domain: int | None = None) -> subprocess.CompletedProcess[str]:

@@ -18,7 +18,8 @@ from rebt_ros.drawing.dot import render_dot
 from rebt_ros.drawing.svg import render_svg
 from rebt_ros.drawing.text import render_text
 from rebt_ros.storage.bag_metadata import NAME as METADATA
-from rebt_ros.storage.inputs import InputOptions, Loaded, load
+from rebt_ros.storage.input_options import InputOptions
+from rebt_ros.storage.inputs import Loaded, load
 from rebt_ros.study.simulator.configuration import as_behavior_tree
 from rebt_ros.study.simulator.configuration_file import parse_config
 

@@ -28,7 +28,8 @@ from rebt_ros.learning.levels import Levels
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.offline import learning_from_files as offline
 from rebt_ros.offline.result import OfflineLearning
-from rebt_ros.storage.inputs import InputOptions, load
+from rebt_ros.storage.input_options import InputOptions
+from rebt_ros.storage.inputs import load
 from rebt_ros.storage.tree_file import read_tree
 
 ALWAYS = ["decision_tree.dot", "decision_tree.svg", "tree.dot", "tree.json", "tree.svg"]

@@ -25,7 +25,7 @@ from rebt_ros.learning import evaluation, pipeline, suggesting
 from rebt_ros.learning.options import DEFAULTS, LearnOptions
 from rebt_ros.learning.pipeline import learn, learn_from, summary_sentence
 from rebt_ros.logic.conditions import LastActionIs, PreviousActionIs
-from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.storage.input_options import InputOptions
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 SCITOS, TUTOR = SHARED / "scitos_g5_24.csv", SHARED / "tutor.csv"

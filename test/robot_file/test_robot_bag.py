@@ -21,7 +21,8 @@ from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.errors import InputError, OptionError, RebtError
 from rebt_ros.offline.check_and_explain import check, row_of
 from rebt_ros.robot_file.reading import parse_robot_file
-from rebt_ros.storage.inputs import InputOptions, load
+from rebt_ros.storage.input_options import InputOptions
+from rebt_ros.storage.inputs import load
 from rebt_ros.storage.robot_bag import read_robot_bag
 
 ROBOT = parse_robot_file(some.ROBOT_FILE, "robot.yaml")

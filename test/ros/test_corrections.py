@@ -15,7 +15,7 @@ from ros_processes import AGES, NodeProcess, Peer, values_of
 from std_msgs.msg import String
 
 from rebt_ros.storage.inputs import load
-from rebt_ros.storage.recording import recordings
+from rebt_ros.storage.recording_files import recordings
 from rebt_ros.storage.recording_head import Origin, read_head
 
 FIELDS = ("place", "door")

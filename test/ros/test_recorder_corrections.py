@@ -21,7 +21,8 @@ from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.learning.pipeline import learn_from
 from rebt_ros.live.recording_session import RecordingSession
 from rebt_ros.storage.inputs import load
-from rebt_ros.storage.recording import RecordingWriter, recordings
+from rebt_ros.storage.recording import RecordingWriter
+from rebt_ros.storage.recording_files import recordings
 from rebt_ros.storage.recording_head import Origin, read_head
 
 #: Rows per second, and the time between two of them (nanoseconds).

@@ -23,7 +23,8 @@ from recorder_trials import (
 )
 from ros_processes import NodeProcess, Peer, values_of
 
-from rebt_ros.storage.recording import read_recording, recordings
+from rebt_ros.storage.recording import read_recording
+from rebt_ros.storage.recording_files import recordings
 
 #: So many that the first line of a recording alone is longer than the smallest limit below.
 WIDE = 400

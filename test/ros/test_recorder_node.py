@@ -18,7 +18,8 @@ from std_msgs.msg import Bool, String
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.last_action import last_actions
-from rebt_ros.storage.recording import is_recording, read_recording, recordings
+from rebt_ros.storage.recording import read_recording
+from rebt_ros.storage.recording_files import is_recording, recordings
 from rebt_ros.storage.recording_head import Origin, read_head
 
 #: The tests' robots do not send states all the time: their last actions would wait for the next.

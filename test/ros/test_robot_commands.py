@@ -27,7 +27,7 @@ from rebt_ros.robot_file.place import Place
 from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.ros.executor.robot_commands import Goal
 from rebt_ros.ros.message_values import fill
-from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.storage.input_options import InputOptions
 
 STATE = """\
 state:

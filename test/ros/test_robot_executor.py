@@ -18,7 +18,7 @@ from std_msgs.msg import String
 import rebt_ros
 from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.robot_file.reading import parse_robot_file
-from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.storage.input_options import InputOptions
 
 TEXT = """\
 state:

@@ -22,7 +22,7 @@ from test_msgs.action import Fibonacci
 import rebt_ros
 from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.robot_file.reading import parse_robot_file
-from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.storage.input_options import InputOptions
 
 ROBOT = """\
 state: {ahead: {path: "/scan.ranges[-30deg:30deg].@min", max_age: 600}}

@@ -22,7 +22,8 @@ import rebt_ros
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.robot_file.reading import parse_robot_file
-from rebt_ros.storage.inputs import InputOptions, load
+from rebt_ros.storage.input_options import InputOptions
+from rebt_ros.storage.inputs import load
 
 TYPES = """\
 topics:

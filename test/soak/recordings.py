@@ -6,7 +6,8 @@ from pathlib import Path
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.errors import RebtError
-from rebt_ros.storage.recording import SUFFIX, read_recording
+from rebt_ros.storage.recording import read_recording
+from rebt_ros.storage.recording_files import SUFFIX
 from soak.ledger import Ledger
 from soak.robot import action_in, state_of, values_from
 

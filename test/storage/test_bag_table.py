@@ -26,7 +26,8 @@ from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError
 from rebt_ros.storage.bag_metadata import NAME as METADATA
-from rebt_ros.storage.inputs import InputOptions, Loaded, load
+from rebt_ros.storage.input_options import InputOptions
+from rebt_ros.storage.inputs import Loaded, load
 from rebt_ros.storage.recording import RecordingWriter
 
 #: Rows of every whole input.

@@ -19,7 +19,8 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import DocumentError, InputError, OptionError
 from rebt_ros.storage import atomic
 from rebt_ros.storage.atomic import StorageError, write_text_atomically
-from rebt_ros.storage.inputs import InputOptions, load
+from rebt_ros.storage.input_options import InputOptions
+from rebt_ros.storage.inputs import load
 from rebt_ros.storage.recording import RecordingWriter
 from rebt_ros.storage.tree_file import find_tree, read_tree, write_tree
 

@@ -21,13 +21,8 @@ from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError
 from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.storage import recording, recording_rows
-from rebt_ros.storage.recording import (
-    RecordingError,
-    RecordingWriter,
-    is_recording,
-    read_recording,
-    recordings,
-)
+from rebt_ros.storage.recording import RecordingError, RecordingWriter, read_recording
+from rebt_ros.storage.recording_files import is_recording, recordings
 from rebt_ros.storage.recording_head import Head, Origin, head_line, read_head
 from rebt_ros.storage.recording_rows import LABEL, record_type
 

@@ -18,7 +18,7 @@ from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError
 from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.storage.recording import RecordingWriter, read_recording
-from rebt_ros.storage.recording_head import MARK
+from rebt_ros.storage.recording_files import MARK
 
 ROBOT = parse_robot_file(some.ROBOT_FILE)
 FEATURES = (

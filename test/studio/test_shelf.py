@@ -9,7 +9,8 @@ import pytest
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError, OptionError
-from rebt_ros.storage.recording import RecordingWriter, read_recording, recordings
+from rebt_ros.storage.recording import RecordingWriter, read_recording
+from rebt_ros.storage.recording_files import recordings
 from rebt_ros.studio.shelf import UNDO_TIME, Shelf
 
 

@@ -16,13 +16,13 @@ from typing import Any
 
 import pytest
 
+from rebt_ros import workers
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands import experiment
 from rebt_ros.decision_tree.tree import DecisionTree
 from rebt_ros.demonstration.demonstration import DEFAULT_CHANNEL
 from rebt_ros.errors import OptionError
 from rebt_ros.study import experiment as study_experiment
-from rebt_ros.study import workers
 from rebt_ros.study.configurations import Lost, configuration_paths, read_where_possible
 from rebt_ros.study.experiment import run_experiment
 from rebt_ros.study.mode import Mode

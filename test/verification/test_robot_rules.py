@@ -19,7 +19,7 @@ from rebt_ros.offline.check_and_explain import check, repaired
 from rebt_ros.offline.learning_from_files import learn
 from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.robot_file.reading import parse_robot_file
-from rebt_ros.storage.inputs import InputOptions
+from rebt_ros.storage.input_options import InputOptions
 from rebt_ros.verification import rules_file
 from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.proof import Answer

@@ -1,4 +1,4 @@
-"""Runs configurations side by side: on the processors of this machine, or on a Dask cluster.
+"""Runs work side by side: on the processors of this machine, or on a Dask cluster.
 
 joblib does it in both cases.
 """
@@ -14,14 +14,11 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
+from typing import Any, Literal, TypeVar
 
 import joblib
 
 from rebt_ros.errors import OptionError, RebtError
-from rebt_ros.study.configurations import Lost
-from rebt_ros.study.results import ConfigurationResult
-from rebt_ros.study.settings import Settings
-from rebt_ros.study.simulator.configuration import ExperimentConfig
 
 #: Until a scheduler must have answered (seconds).
 _PATIENCE = 10.0
@@ -29,33 +26,46 @@ _ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:[0-9]{1,5}")
 _SUCH_AS = "name one such as tcp://127.0.0.1:8786"
 #: How often a worker looks whether its parent is there.
 _WATCH_SECONDS = 0.5
-#: joblib 1.3 returns results in order only, so that those behind a slow configuration wait for it.
+#: joblib 1.3 returns results in order only, so that those behind a slow one wait for it.
 _IN_ORDER = joblib.__version__.startswith("1.3.")
 
 
-#: Runs a configuration, and says why where it cannot.
-Attempt = Callable[[ExperimentConfig, Settings], ConfigurationResult | Lost]
+_Answer = TypeVar("_Answer")
 
 
 class WorkerError(RebtError):
     """A worker, or the cluster, does not work."""
 
 
+def check_workers(jobs: int, scheduler: str | None) -> None:
+    """Refuses a number of jobs, or an address of a scheduler, that makes no sense.
+
+    Raises:
+        OptionError: It makes none.
+    """
+    if jobs == 0:
+        raise OptionError("jobs is 0: name a number of processes, or -1 for one per processor.")
+    if scheduler is not None and not _ADDRESS.fullmatch(scheduler):
+        raise OptionError(f"the scheduler {scheduler!r} is no address: {_SUCH_AS}.")
+
+
 def run_all(
-    configs: Sequence[ExperimentConfig],
-    settings: Settings,
-    attempt: Attempt,
+    work: Callable[..., _Answer],
+    tasks: Sequence[tuple[Any, ...]],
     jobs: int = -1,
     scheduler: str | None = None,
-) -> Iterator[ConfigurationResult | Lost]:
-    """Runs configurations.
+    *,
+    batch: int | Literal["auto"] = 1,
+) -> Iterator[_Answer]:
+    """Runs tasks.
 
     Args:
-        configs: What to run.
-        settings: How.
-        attempt: What runs each of them; known by its name to other processes.
+        work: What is called with the values of each task; known by its name to other processes.
+        tasks: Values that other processes can be sent.
         jobs: Processes; -1 for one per processor.  Not for a cluster, of which all workers work.
         scheduler: Address of a Dask scheduler; None for this machine.
+        batch: Tasks that are handed out at a time; 1, so that each answer is there as soon as it is
+            known, or "auto" where they are short.
 
     Yields:
         What came out, as soon as it is known and so in any order.
@@ -64,23 +74,19 @@ def run_all(
         OptionError: A number of jobs or an address that makes no sense.
         WorkerError: A worker died, or the cluster cannot be used.
     """
-    if jobs == 0:
-        raise OptionError("jobs is 0: name a number of processes, or -1 for one per processor.")
-    if scheduler is not None and not _ADDRESS.fullmatch(scheduler):
-        raise OptionError(f"the scheduler {scheduler!r} is no address: {_SUCH_AS}.")
-    if not configs:
+    check_workers(jobs, scheduler)
+    if not tasks:
         return
     here = os.getpid() if scheduler is None else None
-    tasks = (joblib.delayed(_attempt)(attempt, config, settings, here) for config in configs)
+    calls = (joblib.delayed(_do)(work, task, here) for task in tasks)
     with _cluster(scheduler) if scheduler is not None else contextlib.nullcontext():
-        # One at a time, so that each is written as soon as it is finished.
         parallel = joblib.Parallel(
-            n_jobs=-1 if scheduler is not None else min(jobs, len(configs)),
-            batch_size=1,
+            n_jobs=-1 if scheduler is not None else min(jobs, len(tasks)),
+            batch_size=batch,
             return_as="generator" if _IN_ORDER else "generator_unordered",
         )
         try:
-            yield from parallel(tasks)
+            yield from parallel(calls)
         except BrokenProcessPool as err:
             raise WorkerError(
                 "a worker process died, perhaps of a lack of memory: start the same command again "
@@ -88,13 +94,11 @@ def run_all(
             ) from err
 
 
-def _attempt(
-    attempt: Attempt, config: ExperimentConfig, settings: Settings, parent: int | None
-) -> ConfigurationResult | Lost:
-    """Runs a configuration, in the process `parent` or in one that is to end with it, if any."""
+def _do(work: Callable[..., _Answer], task: tuple[Any, ...], parent: int | None) -> _Answer:
+    """Does a task, in the process `parent` or in one that is to end with it, if any."""
     if parent not in (None, os.getpid()):
         _end_with(parent)
-    return attempt(config, settings)
+    return work(*task)
 
 
 @functools.cache

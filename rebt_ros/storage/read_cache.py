@@ -1,0 +1,161 @@
+"""A directory that keeps what was read of inputs, by what they hold and what decides about rows."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import secrets
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from rebt_ros.robot_file.robot_file import RobotFile
+from rebt_ros.storage.column_file import NoColumnFileError, packed, read_columns
+from rebt_ros.storage.input_options import InputKind, Source
+from rebt_ros.storage.read import Read
+from rebt_ros.storage.versions import source_digest, versions
+
+SUFFIX: Final = ".columns"
+
+#: Packages whose versions decide what is read.
+_DECIDING: Final = ("numpy", "rosbags")
+#: Where SQLite keeps what it has not yet written to a database, behind the name of the latter.
+_LOGS: Final = ("-wal", "-journal")
+_BLOCK: Final = 1 << 20
+
+
+def default_cache() -> Path | None:
+    """Where what was read is kept by default: in the user's cache, as XDG has it; None without one.
+
+    https://specifications.freedesktop.org/basedir-spec
+    """
+    there = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    base = there if there.is_absolute() else Path(os.path.expanduser("~/.cache"))
+    return base / "rebt_ros" if base.is_absolute() else None
+
+
+def is_kept(source: Source) -> bool:
+    """Whether what is read of an input is worth keeping: recordings are columns already."""
+    return source.kind is not InputKind.RECORDING and (
+        source.path.is_dir() or source.path.is_file()
+    )
+
+
+def key_of(source: Source, deciding: tuple[object, ...]) -> str:
+    """What tells apart inputs of which something else is read.
+
+    Args:
+        source: An input, of which the content and the name count.
+        deciding: Options that decide about rows, in plain values.
+
+    Returns:
+        A digest of these and of the versions of what reads.
+
+    Raises:
+        OSError: The input cannot be read.
+    """
+    digest = hashlib.sha256()
+    name = source.path.absolute().name
+    said = (source.kind.value, name, *_versions(), json.dumps(deciding, default=repr))
+    digest.update(repr(said).encode("utf-8", "surrogatepass"))
+    for file in _files(source.path):
+        called = os.fsencode(file.name)
+        if not file.is_file():
+            digest.update(b"\0other\0" + called)
+            continue
+        with file.open("rb", buffering=0) as opened:
+            size = os.fstat(opened.fileno()).st_size
+            digest.update(b"\0file\0%b\0%d\0" % (called, size))
+            while block := opened.read(_BLOCK):
+                digest.update(block)
+    return digest.hexdigest()
+
+
+def state_of(source: Source) -> tuple[tuple[str, int, int], ...]:
+    """Names, sizes and times of an input's files, which change where somebody writes to it.
+
+    Raises:
+        OSError: It cannot be looked at.
+    """
+    return tuple(
+        (file.name, status.st_size, status.st_mtime_ns)
+        for file in _files(source.path)
+        for status in (file.lstat(),)
+    )
+
+
+def size_of(source: Source) -> int:
+    """Bytes that an input has; 0 where that is not known."""
+    try:
+        return sum(size for _, size, _ in state_of(source))
+    except OSError:
+        return 0
+
+
+class ReadCache:
+    """What was read earlier.
+
+    Args:
+        directory: Where it is kept; created when something is.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+
+    def get(self, key: str, source: Source, robot: RobotFile | None) -> Read | None:
+        """What was read of an input, by this robot file; None where that is not kept."""
+        try:
+            read, words, has_robot = read_columns(self._path(key))
+        except (OSError, NoColumnFileError):
+            return None
+        if words.get("path") not in (None, str(source.path)):
+            return None
+        return replace(read, robot=robot) if has_robot else read
+
+    def put(self, key: str, content: bytes) -> None:
+        """Keeps the bytes that `kept_bytes` gives; another process sees all of them or nothing.
+
+        Raises:
+            OSError: They cannot be written.
+        """
+        path = self._path(key)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # The checksum tells what a loss of power leaves, so that nothing waits for the disk.
+        temporary = path.with_name(f".{key[:16]}.{os.getpid()}.{secrets.token_hex(4)}")
+        try:
+            temporary.write_bytes(content)
+            temporary.replace(path)
+        finally:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+    def _path(self, key: str) -> Path:
+        return self.directory / key[:2] / f"{key[2:]}{SUFFIX}"
+
+
+def kept_bytes(source: Source, read: Read) -> bytes:
+    """What is kept of an input: with its path where notes name it, which then must be the same."""
+    path = str(source.path)
+    return packed(read, {"path": path} if any(path in note for note in read.notes) else None)
+
+
+@cache
+def _versions() -> tuple[str, ...]:
+    return (source_digest(), *(f"{name} {one}" for name, one in versions(_DECIDING).items()))
+
+
+def _files(path: Path) -> Iterator[Path]:
+    """The files that an input is read from, as far as they are there."""
+    if path.is_dir():
+        yield from sorted(path.iterdir())
+        return
+    yield path
+    for log in _LOGS:
+        beside = path.resolve()
+        beside = beside.with_name(beside.name + log)
+        if beside.is_file():
+            yield beside

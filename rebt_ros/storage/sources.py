@@ -1,0 +1,177 @@
+"""What a user names on the command line, as files and directories that are one demonstration each.
+
+A directory stands for what is in it, a pattern such as `fleet/*/run_?` for what it matches, and
+`@list.txt` for the lines of a file.
+"""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from rebt_ros.errors import InputError
+from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
+from rebt_ros.storage.bag_metadata import NAME as METADATA
+from rebt_ros.storage.input_options import InputKind, Source
+from rebt_ros.storage.recording_files import SUFFIX, is_recording, recordings
+from rebt_ros.storage.text import unreadable
+
+#: Suffixes of tables, in lower case.
+_TABLES = frozenset({".csv", ".tsv"})
+
+#: How an input begins that is a list of inputs.
+_LIST: Final = "@"
+#: Begins a line of a list that says nothing.
+_COMMENT: Final = "#"
+_LONGEST_LIST: Final = 1 << 30
+
+
+@dataclass(frozen=True, slots=True)
+class Strange:
+    """A file that was looked at, and that is nothing to read."""
+
+    path: Path
+    error: InputError
+
+
+def sources_of(inputs: Sequence[Path], *, strict: bool = True) -> list[Source | Strange]:
+    """The demonstrations that inputs stand for.
+
+    Args:
+        inputs: Bags (directories, .mcap or .db3 files), recordings, CSV tables, directories of any
+            of them, patterns of their paths, and `@` with the path of a list of all those.
+        strict: Whether a file that is nothing to read is an error, instead of a `Strange`.
+
+    Returns:
+        In the order of the inputs; those of a directory oldest first, those of a pattern sorted.
+
+    Raises:
+        InputError: There is no input, one is there twice, or one is not there.
+    """
+    if not inputs:
+        raise InputError("there is no input: name a bag, a recording or a CSV table.")
+    found: list[Source | Strange] = []
+    for path in _expanded(inputs):
+        try:
+            found += _sources(path)
+        except OSError as err:
+            raise unreadable(path, err) from err
+        except InputError as err:
+            if strict or not path.is_file():
+                raise
+            found.append(Strange(path, err))
+    _check_distinct([one.path for one in found])
+    return found
+
+
+def has_table_suffix(file: Path) -> bool:
+    """Whether the name of a file says that it is a table."""
+    return file.suffix.lower() in _TABLES
+
+
+def _expanded(inputs: Sequence[Path]) -> Iterator[Path]:
+    """The inputs, with what lists and patterns stand for in their places."""
+    for path in inputs:
+        if str(path).startswith(_LIST) and not path.exists():
+            yield from _listed(Path(str(path)[len(_LIST) :]))
+        else:
+            yield from _matching(path)
+
+
+def _listed(file: Path) -> Iterator[Path]:
+    """What the lines of a list stand for, one of which is what it would be as an input."""
+    try:
+        if file.is_file() and file.stat().st_size > _LONGEST_LIST:
+            raise InputError(f"{file} is too long for a list of inputs: name a shorter one.")
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as err:
+        raise InputError(
+            f"{file} is no list of inputs: write a path in each of its lines."
+        ) from err
+    except OSError as err:
+        raise unreadable(file, err) from err
+    named = [line.strip() for line in lines]
+    named = [line for line in named if line and not line.startswith(_COMMENT)]
+    if not named:
+        raise InputError(f"{file} lists no inputs: write a path in each of its lines.")
+    for line in named:
+        if line.startswith(_LIST) and not Path(line).exists():
+            raise InputError(f"{file} lists the list {line}: name it as an input of its own.")
+        if "\0" in line:
+            raise _no_list(file)
+        yield from _matching(Path(line))
+
+
+def _no_list(file: Path) -> InputError:
+    return InputError(f"{file} is no list of inputs: write a path in each of its lines.")
+
+
+def _matching(path: Path) -> Iterator[Path]:
+    """What a pattern matches, sorted; a path that is there stands for itself."""
+    if not glob.has_magic(str(path)) or path.exists():
+        yield path
+        return
+    found = sorted(glob.glob(str(path), recursive=True))
+    if not found:
+        raise InputError(f"nothing matches {path}: name bags, recordings or CSV tables.")
+    yield from map(Path, found)
+
+
+def _sources(path: Path) -> Iterator[Source]:
+    """The demonstrations that a path stands for."""
+    if not path.exists():
+        raise InputError(f"{path} does not exist: name a bag, a recording or a CSV table.")
+    if path.is_dir():
+        yield from [Source(path, InputKind.BAG)] if is_bag(path) else _within(path)
+    elif path.name == METADATA:
+        yield Source(path.absolute().parent, InputKind.BAG)
+    else:
+        yield Source(path, _kind_of(path))
+
+
+def _within(directory: Path) -> Iterator[Source]:
+    """The demonstrations in a directory that is no bag: recordings, bags or tables."""
+    inside = sorted(directory.iterdir())
+    bags = [path for path in inside if path.is_dir() and is_bag(path)]
+    recorded = (
+        path for path in inside if path.suffix == SUFFIX and path.is_file() and is_recording(path)
+    )
+    if first := next(recorded, None):
+        if bags:
+            raise InputError(
+                f"{directory} holds bags and recordings ({bags[0].name}, {first.name}): name those "
+                "to read."
+            )
+        yield from (Source(recording, InputKind.RECORDING) for recording in recordings(directory))
+        return
+    tables = [path for path in inside if has_table_suffix(path) and path.is_file()]
+    if not bags and not tables:
+        yield from (Source(recording, InputKind.RECORDING) for recording in recordings(directory))
+        return
+    if bags and tables:
+        raise InputError(
+            f"{directory} holds bags and tables ({bags[0].name}, {tables[0].name}): name those to "
+            "read."
+        )
+    yield from (Source(bag, InputKind.BAG) for bag in bags)
+    yield from (Source(table, InputKind.TABLE) for table in tables)
+
+
+def _kind_of(file: Path) -> InputKind:
+    refuse_strangers(file)
+    if holds_messages(file):
+        return InputKind.BAG
+    if has_table_suffix(file) or not is_recording(file):
+        return InputKind.TABLE
+    return InputKind.RECORDING
+
+
+def _check_distinct(paths: Sequence[Path]) -> None:
+    seen: set[Path] = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise InputError(f"{path} is given twice: name every demonstration once.")
+        seen.add(path.resolve())
