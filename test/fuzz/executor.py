@@ -28,8 +28,9 @@ from rebt_ros.storage.tree_file import write_tree
 RATE: Final = 100.0
 #: How often the state is published (Hz).
 _STATE_RATE: Final = 50.0
-#: Share of documents that must have been read; on a busy machine one may replace another unseen.
-_LEAST_HEARD: Final = 0.95
+#: Share of documents that must have been read; on a busy machine one may replace another unseen,
+#: while a document that is taken for a tree is found by what the executor commands then.
+_LEAST_HEARD: Final = 0.5
 
 TARGET: Final = "executor"
 
