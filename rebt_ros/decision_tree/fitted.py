@@ -95,6 +95,12 @@ class FittedTree:
         return int(np.count_nonzero(self.grown.left < 0))
 
     @property
+    def comparisons(self) -> int:
+        """Splits before it is pruned that compare a number, instead of asking yes or no."""
+        split = self.grown.column[self.grown.left >= 0].tolist()
+        return sum(isinstance(self.asked[column], Number) for column in split)
+
+    @property
     def explanation(self) -> int:
         """How much it takes to explain the rows that it was fitted to: leaves and exceptions.
 
@@ -112,6 +118,12 @@ class FittedTree:
         return np.asarray(
             self.grown.majority[standing[_reached(self.grown, table, self.vocabulary)]]
         )
+
+    @property
+    def explaining_leaves(self) -> int:
+        """Leaves of the tree of the explanation; the other part of its size are exceptions."""
+        standing = self.path.standing(self._explaining()[1])
+        return len(np.unique(standing[self.grown.left < 0]))
 
     def _explaining(self) -> tuple[int, BoolArray]:
         """The size of the explanation, and which nodes are its leaves, or would be if reached."""

@@ -3,9 +3,11 @@
 CART grows a tree greedily, and where rows are few, splits that only happen to part them are as good
 to it as the ones that the demonstrator goes by.  Trees that are grown from random choices of the
 columns fit the same rows; those with the fewest leaves are the simplest explanations (Occam's
-razor), and generalize better.  Of several, the one with the longest paths is taken: it parts few
-rows from the rest at a time, and so is most like a list of rules by priority, as demonstrators have
-in mind and as behavior trees are.  Where none has fewer leaves, the greedy tree stays.
+razor), and generalize better.  Of several, the one with the fewest comparisons of numbers is taken:
+a threshold is one of many that could have been tried until rows are parted by chance, where yes and
+no leave nothing to choose.  Of those it is the one with the longest paths: it parts few rows from
+the rest at a time, and so is most like a list of rules by priority, as demonstrators have in mind
+and as behavior trees are.  Where none is simpler, the greedy tree stays.
 
 This is for trees that a person could read, with rows enough for each leaf.  Large trees stand for
 curved borders by many small steps, whose number says nothing; and few rows are fitted by many small
@@ -22,7 +24,7 @@ from rebt_ros.demonstration.table import DemonstrationTable
 
 #: Leaves and rows up to which there is a search.
 _MOST_LEAVES, _MOST_ROWS = 30, 5_000
-_LEAST_ROWS_PER_LEAF = 10
+_LEAST_ROWS_PER_LEAF = 5
 #: Trees that are tried for each share of the columns from which a split is chosen.
 _TRIES, _SHARES = 30, (0.3, 0.6, 0.8)
 
@@ -38,7 +40,7 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
     if leaves > _MOST_LEAVES or rows > _MOST_ROWS or rows < _LEAST_ROWS_PER_LEAF * leaves:
         return fitted
     right = fitted.right(table)
-    best, rank = fitted, (fitted.leaves, -np.inf)
+    best, rank = fitted, (fitted.leaves, fitted.comparisons, -np.inf)
     for number in range(_TRIES):
         for share in _SHARES:
             other = fit_again(table, fitted, number, share)
@@ -50,6 +52,6 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
     return best
 
 
-def _rank(table: DemonstrationTable, fitted: FittedTree) -> tuple[int, float]:
+def _rank(table: DemonstrationTable, fitted: FittedTree) -> tuple[int, int, float]:
     """The lower, the simpler."""
-    return fitted.leaves, -float(np.mean(fitted.path_lengths(table)))
+    return fitted.leaves, fitted.comparisons, -float(np.mean(fitted.path_lengths(table)))

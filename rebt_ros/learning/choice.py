@@ -3,8 +3,9 @@
 What cross-validation decides, it decides on rows that a tree was not learned from:
 
 - whether the tree may test the previous action: where that makes the explanation of the rows much
-  simpler (see `FittedTree.explanation`), whatever cross-validation says, or makes it no larger and
-  raises the mean recall of unpruned trees after their own choices;
+  simpler (see `FittedTree.explanation`), or as large with fewer comparisons of numbers, whatever
+  cross-validation says, or makes it no larger and raises the mean recall of unpruned trees after
+  their own choices;
 - whether it may test differences of features, by agreement and size;
 - the pruning level, by mean recall, and by the size of the explanation where that leaves much open:
   pruning has to pay (see `judged_levels`);
@@ -100,13 +101,16 @@ def choose(
     psa, reason = _choose_psa(judged, ccp_alpha, options)
     fitted = judged.fitted
     if options.simplest and options.upsample is Upsampling.NONE:
-        fitted = simplest(choice.shown, fitted)
-        if fitted is not judged.fitted:
-            ccp_alpha = _of_another_fit(judged.fitted, ccp_alpha, fitted, options)
+        other = simplest(choice.shown, fitted)
+        its = _of_another_fit(fitted, ccp_alpha, other, options)
+        asked = _asked_for(fitted, options) is not None
+        # Where it is pruned, what it says of mistakes is not what makes it simple.
+        if other is not fitted and (asked or _leaves(other, its) <= _leaves(fitted, ccp_alpha)):
             reasons.append(
-                f"Of the trees that fit the rows, one with {fitted.leaves} leaves is the simplest "
-                f"({judged.fitted.leaves} where splits are chosen greedily)."
+                f"Of the trees that fit the rows, one with {_size(other)} is the simplest "
+                f"({_size(fitted)} where splits are chosen greedily)."
             )
+            fitted, ccp_alpha = other, its
     return ChosenPolicy(fitted, ccp_alpha, psa, levels, (*reasons, reason), judged.of_all)
 
 
@@ -164,6 +168,19 @@ def _unjudged(table: DemonstrationTable, options: LearnOptions) -> ChosenPolicy:
     return ChosenPolicy(fitted, ccp_alpha, options.psa is Use.ALWAYS, None, (reason,))
 
 
+def _leaves(fitted: FittedTree, ccp_alpha: float) -> int:
+    return fitted.at(ccp_alpha).tree.leaves
+
+
+def _size(fitted: FittedTree) -> str:
+    return f"{fitted.leaves} leaves and {fitted.comparisons} comparisons of numbers"
+
+
+def _simpler(first: FittedTree, second: FittedTree) -> bool:
+    """Whether a tree takes fewer comparisons of numbers than another one, and no more leaves."""
+    return first.leaves <= second.leaves and first.comparisons < second.comparisons
+
+
 class _Choice:
     """Cross-validations of one table, each made once."""
 
@@ -214,6 +231,16 @@ class _Choice:
         if after > before:
             self.reasons.append(f"The previous action is not tested: {compared}.")
             return History.NONE
+        if after == before:
+            states_alone, with_previous = (
+                simplest(self._telling, self._fitted(one)) for one in (FEATURES_ALONE, with_it)
+            )
+            if _simpler(with_previous, states_alone):
+                self.reasons.append(
+                    f"The previous action is tested: {compared}, and {with_previous.comparisons} "
+                    f"comparisons of numbers do instead of {states_alone.comparisons}."
+                )
+                return History.PREVIOUS
         judged = [self.judged(one, telling=True).unpruned() for one in (FEATURES_ALONE, with_it)]
         raised = clearly_raised(*judged)
         without, recall = (one.mean_recalls[0] for one in judged)

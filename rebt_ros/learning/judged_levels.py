@@ -4,9 +4,12 @@ The largest tree is chosen that is not clearly worse than the best one: by more 
 of a standard error of their difference, fold by fold.  Where demonstrators err, large trees are
 clearly worse, and pruned.  Elsewhere the few rows that decide a task stay.
 
-Few demonstrations often leave that open, also where they err.  Then a tree that parts each mistake
-from the rows around it has more leaves than a smaller one has leaves and exceptions.  Where that is
-clear, by a standard error of such counts, the smaller one is chosen.
+Where a small tree has few rows for each leaf, a single fold does not make that clear: what it is
+judged by, such as the only row in which a door is opened, is then all that there was to learn from.
+
+Few demonstrations often leave the level open, also where they err.  Then a tree that parts each
+mistake from the rows around it has more leaves than a smaller one has leaves and exceptions.  Where
+that is clear, by a standard error of such counts, the smaller one is chosen.
 
 The usual rule of one standard error (Breiman et al., 1984) is another one: it takes the smallest
 tree, and an error that measures how much demonstrations differ instead of how much trees do.
@@ -23,8 +26,12 @@ from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 #: Standard errors of a difference from which on it is clear.  A difference that a single fold makes
 #: is one standard error large, and clear; one on which folds disagree is not.
 _CLEAR = 0.75
+#: ... of a small tree with few rows for each leaf: a single fold is not enough.
+_CLEAR_OF_FEW = 1.0
 #: With fewer rows for each leaf, the size of an explanation tells nothing.
 _LEAST_ROWS_PER_LEAF = 10
+#: Leaves of a small tree, which a person could read without pruning.
+_MOST_LEAVES = 30
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -85,8 +92,7 @@ class JudgedLevels:
         least = sizes[as_good].min()
         chosen = int(np.argmax(as_good & (sizes - least <= np.sqrt(sizes + least))))
         # Few rows are explained by many small trees, most of them by chance.
-        told = self.shown.sum() >= _LEAST_ROWS_PER_LEAF * self.leaves[chosen]
-        return chosen if told else self.largest
+        return self.largest if self._few_rows(chosen) else chosen
 
     @property
     def largest(self) -> int:
@@ -97,7 +103,12 @@ class JudgedLevels:
     def _as_good(self) -> BoolArray:
         """Whether each level, up to the best, is not clearly worse than it, shape (best + 1,)."""
         contributions = self.contributions[:, : self.best + 1]
-        return ~_clearly_above_zero(contributions[:, -1:] - contributions)
+        few = self.leaves[0] <= _MOST_LEAVES and self._few_rows(0)
+        clear = _CLEAR_OF_FEW if few else _CLEAR
+        return ~_clearly_above_zero(contributions[:, -1:] - contributions, clear)
+
+    def _few_rows(self, level: int) -> bool:
+        return bool(self.shown.sum() < _LEAST_ROWS_PER_LEAF * self.leaves[level])
 
     def at(self, ccp_alpha: float) -> int:
         """The level that a ``ccp_alpha`` comes to."""
@@ -113,12 +124,12 @@ class JudgedLevels:
 def clearly_raised(before: JudgedLevels, after: JudgedLevels) -> bool:
     """Whether the first level's mean recall is clearly higher in `after`, which has equal folds."""
     gains = after.contributions[:, :1] - before.contributions[:, :1]
-    return bool(_clearly_above_zero(gains)[0])
+    return bool(_clearly_above_zero(gains, _CLEAR)[0])
 
 
-def _clearly_above_zero(gains: FloatArray) -> BoolArray:
+def _clearly_above_zero(gains: FloatArray, standard_errors: float) -> BoolArray:
     """Of sums over folds, shape (levels,), where there are so many gains as folds and levels."""
-    clearly = _CLEAR * len(gains) * _standard_error(gains)
+    clearly = standard_errors * len(gains) * _standard_error(gains)
     return np.asarray(np.round(gains.sum(axis=0) - clearly, 12) > 0)
 
 

@@ -26,6 +26,7 @@ import numpy as np
 
 from rebt_ros.arrays import IntArray
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
+from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.lags import evenly_spaced
 from rebt_ros.demonstration.last_action import History
@@ -52,6 +53,10 @@ _HALF_A_RUN = 0.45
 #: Where previous actions bring the explanation to this share, without a delay, a task needs memory;
 #: then a delay of half a run or more has to do as much.
 _MUCH_SIMPLER = 1 / 3
+#: Who goes on until something is over looks late, too: a fan that starts at 25 degrees and runs
+#: until it is 22.  Previous actions explain that with so many leaves for each action: where it
+#: begins, and until when it is held.
+_BEGUN_AND_HELD = 2
 #: The explanation must be smaller by that many standard errors, and by that share.
 _STANDARD_ERRORS, _SHARE = 1.0, 0.1
 #: What takes a leaf or an exception for more than this share of the rows explains nothing.
@@ -106,9 +111,11 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
     smallest explanation by states and previous actions.  For a task that needs memory is hardly
     explained by states alone; but who goes to and fro between two places looks as if the middle
     told when to turn round, half a way late.  So where previous actions bring the explanation to a
-    third, without a delay, such a delay is only taken if it does as much.  Of neighbours that are
-    equally small it is the one in the middle; if they reach to the longest delay, as where each
-    state follows from the one before, the first of them.
+    third, without a delay, such a delay is only taken if it does as much.  And who starts something
+    at one border and goes on until another one looks as if late at a border between them: where
+    previous actions explain that with two leaves for each action, states alone have to do clearly
+    better than that.  Of neighbours that are equally small it is the one in the middle; if they
+    reach to the longest delay, as where each state follows from the one before, the first of them.
 
     A delay is clear if its explanation is not larger than a third of the rows, and smaller than the
     one without a delay by a tenth and by a standard error, where sizes are counts: of a and b, the
@@ -178,7 +185,8 @@ class _Explanations:
     def trials(self) -> tuple[tuple[Trial, ...], bool]:
         """What decides, by ascending delay, and whether it is about states alone."""
         alone = Trial(0, self._size(0, FEATURES_ALONE))
-        with_previous = Trial(0, self._size(0, _WITH_PREVIOUS))
+        without_delay = self._fitted(0, _WITH_PREVIOUS)
+        with_previous = Trial(0, without_delay.explanation)
         # Every action takes a leaf or an exception: nothing can be smaller than that.
         least = len(np.unique(self._table.chosen[self._rows]))
         for one in (alone, with_previous):
@@ -187,7 +195,10 @@ class _Explanations:
         trials = self._around(alone, FEATURES_ALONE)
         best = _peak(trials)
         half_a_run = _HALF_A_RUN * _usual_run(self._table)
-        if best.rows < half_a_run and best.size <= _ALONE * with_previous.size:
+        held = without_delay.explaining_leaves <= _BEGUN_AND_HELD * least
+        needs_memory = held and not _clear((with_previous, *trials[1:]), len(self))
+        tells = best.rows < half_a_run and best.size <= _ALONE * with_previous.size
+        if tells and not (_clear(trials, len(self)) and needs_memory):
             return trials, True
         trials = self._around(with_previous, _WITH_PREVIOUS)
         much_simpler = _peak(trials).size <= _MUCH_SIMPLER * with_previous.size
@@ -213,6 +224,9 @@ class _Explanations:
             delays = {max(best - step, 0), min(best + step, self._most)}
 
     def _size(self, delay: int, vocabulary: Vocabulary) -> int:
+        return self._fitted(delay, vocabulary).explanation
+
+    def _fitted(self, delay: int, vocabulary: Vocabulary) -> FittedTree:
         table, rows = self._table, self._rows
         late = replace(
             table,
@@ -223,7 +237,7 @@ class _Explanations:
             before=None,
             previous=table.previous[rows],
         )
-        return fit(late, FitOptions(vocabulary=vocabulary)).explanation
+        return fit(late, FitOptions(vocabulary=vocabulary))
 
 
 def _stretches(rows: IntArray) -> IntArray:

@@ -15,9 +15,10 @@ from pruned_trees import train
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
+from rebt_ros.decision_tree.simplest import simplest
 from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.last_action import History
-from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
 from rebt_ros.learning import evaluation
@@ -113,6 +114,16 @@ def test_a_larger_tree_that_is_worse_in_a_single_fold_is_clearly_worse() -> None
     fold = [[8, 8], [8, 8]]
     levels = judged([fold, [[7, 8], [8, 8]], fold, fold], [[10, 10]] * 4)
     assert levels.best == levels.chosen == 1
+
+
+def test_a_single_fold_is_not_enough_where_leaves_of_a_small_tree_have_few_rows() -> None:
+    fold = [[2, 2], [2, 2]]
+    hits, shown = [fold, [[1, 2], [2, 2]], fold, fold], [[3, 2]] * 4
+    for leaves, chosen in (([2, 1], 1), ([3, 1], 0), ([30, 1], 0), ([31, 1], 1)):
+        levels = judged(hits, shown, leaves)
+        assert (levels.best, levels.chosen) == (1, chosen)
+    twice = [*hits[1:], hits[1]]
+    assert judged(twice, shown, [3, 1]).chosen == 1
 
 
 def test_of_trees_that_folds_disagree_about_the_largest_is_chosen() -> None:
@@ -391,9 +402,47 @@ def test_history_is_tested_where_it_makes_the_explanation_simpler_or_raises_reca
     error = float(np.std(more, ddof=1) * np.sqrt(len(more)))
     assume(abs(more.sum() - 0.75 * error) > 1e-9)
     clearly = more.sum() > 0.75 * error
-    tested = with_it <= 0.8 * without or (with_it <= without and clearly)
+    alone, with_previous = (
+        simplest(rows, fit(rows, FitOptions(vocabulary=vocabulary)))
+        for vocabulary in (FEATURES_ALONE, some.PREVIOUS)
+    )
+    fewer = (
+        with_it == without
+        and with_previous.leaves <= alone.leaves
+        and with_previous.comparisons < alone.comparisons
+    )
+    tested = with_it <= 0.8 * without or fewer or (with_it <= without and clearly)
     history = choose(rows, LearnOptions(differences=Use.NEVER)).fitted.vocabulary.history
     assert history is (History.PREVIOUS if tested else History.NONE)
+
+
+def rung_once(waits: int, start: float, goes: int = 12) -> DemonstrationTable:
+    """Waits at some place until a bell rings, for one row, and goes from there."""
+    states = [(start, 0.0)] * waits + [(start, 1.0)]
+    states += [(start + 0.2 * step, 0.0) for step in range(1, goes)]
+    return DemonstrationTable(
+        channel="action",
+        features=(Feature("position"), Feature("ringing", FeatureKind.BINARY)),
+        states=np.array(states),
+        actions=("go", "wait"),
+        chosen=np.array([1] * waits + [0] * goes),
+        demonstrations=("0",),
+        demonstration=np.zeros(waits + goes, dtype=np.int64),
+        stamps=np.arange(waits + goes),
+    )
+
+
+@pytest.mark.parametrize(("waits", "start"), [(9, 3.7), (22, 2.9), (25, 0.3)])
+def test_what_was_heard_explains_one_demonstration_better_than_where_it_happened_to_be(
+    waits: int, start: float
+) -> None:
+    rows = rung_once(waits, start)
+    for history in (None, History.PREVIOUS):
+        policy = choose(rows, LearnOptions(history=history))
+        assert policy.fitted.vocabulary.history is History.PREVIOUS
+        assert policy.fitted.leaves == 3
+        assert policy.fitted.comparisons == 0
+    assert "0 comparisons of numbers do instead of 1" in choose(rows, LearnOptions()).reasons[0]
 
 
 def test_one_demonstration_in_which_little_happens_is_not_pruned() -> None:

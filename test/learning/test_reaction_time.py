@@ -337,6 +337,40 @@ def test_the_same_table_gives_the_same_estimate() -> None:
     assert estimate(shuttles(2)) == estimate(shuttles(2))
 
 
+def fan(late: int, seed: int, rows: int = 200) -> tuple[list[list[float]], list[int]]:
+    """Cools from 25 degrees on until it is 22, whatever is measured beside: this needs memory."""
+    chance = random.Random(seed)
+    x, runs, cooled = chance.uniform(18, 28), False, 0.0
+
+    def decide() -> Iterator[int]:
+        nonlocal runs
+        while True:
+            runs = x > 25 or (runs and x > 22)
+            yield RIGHT if runs else STAY
+
+    act = acted_late(decide(), late)
+    states, actions = [], []
+    for _ in range(rows):
+        states.append([x, chance.random()])
+        actions.append(act())
+        cooled += 0.35 * ((actions[-1] == RIGHT) - cooled)
+        x += 0.2 - 0.5 * cooled + chance.gauss(0, 0.03)
+    return states, actions
+
+
+@pytest.mark.parametrize("count", [1, 3, 8])
+@pytest.mark.parametrize("seed", range(4))
+def test_who_goes_on_until_another_border_is_not_late(count: int, seed: int) -> None:
+    table = joined(*(fan(0, 100 * seed + number) for number in range(count)))
+    assert estimate(paced(table, TENTH // 2)).rows == 0
+
+
+@pytest.mark.parametrize("late", [2, 4])
+def test_who_goes_on_until_another_border_may_be_late_too(late: int) -> None:
+    table = joined(*(fan(late, number) for number in range(20)))
+    assert estimate(paced(table, TENTH // 2)).rows == late
+
+
 # --- what it costs --------------------------------------------------------------------------------
 
 
