@@ -35,6 +35,10 @@ ACTION_TYPE = "std_msgs/msg/String"
 #: So many messages can have been recorded at the same time.
 _FEW: Final = 4
 
+#: So many different messages of so many bytes are remembered.
+_MOST_LABELS: Final = 1000
+_LONGEST_LABEL: Final = 1000
+
 #: Longest list of topics in a sentence (characters).
 _LONGEST_LIST: Final = 500
 
@@ -104,6 +108,7 @@ class Feed:
     there: Mapping[str, int]
     """Messages by state topic, of those that can be read."""
     states: _States = field(default_factory=lambda: _States())
+    labels: _Labels = field(default_factory=lambda: _Labels())
     seen: Counter[str] = field(default_factory=Counter)
     """Messages by topic."""
     early: int = 0
@@ -218,8 +223,7 @@ class Feed:
             raise LateError
         data = unpacked(data)
         if kind == ACTION_TYPE:
-            message = cast(_String, _decoded(data, ACTION_TYPE))
-            return self.builder.act(stamp, name, message.data)
+            return self.builder.act(stamp, name, self.labels.read(data))
         values, labels = self.states.read(data)
         return self.builder.observe(stamp, name, values, labels)
 
@@ -363,6 +367,26 @@ class _States:
         little_endian = data[1:2] == b"\x01"
         if len(values) and little_endian and data[len(head) :] == values.tobytes():
             self._heads[len(data)] = _Head(head, numbers, labels)
+
+
+class _Labels:
+    """Reads action messages, of which there are few different ones as a rule."""
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, str] = {}
+
+    def read(self, data: bytes) -> str:
+        """The text of a message.
+
+        Raises:
+            UndecodableError: It cannot be decoded.
+        """
+        label = self._known.get(data)
+        if label is None:
+            label = cast(_String, _decoded(data, ACTION_TYPE)).data
+            if len(self._known) < _MOST_LABELS and len(data) <= _LONGEST_LABEL:
+                self._known[data] = label
+        return label
 
 
 def unpacked(data: bytes) -> bytes:

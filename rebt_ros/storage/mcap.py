@@ -15,7 +15,7 @@ from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import BinaryIO, Final
+from typing import BinaryIO, Final, NamedTuple
 
 from rebt_ros.storage.packing import unlz4, unzstd
 
@@ -65,8 +65,7 @@ class McapChannel:
     """Of the messages: cdr for those of ROS 2."""
 
 
-@dataclass(frozen=True, slots=True)
-class McapMessage:
+class McapMessage(NamedTuple):
     """A message of a channel."""
 
     channel: int
@@ -161,34 +160,49 @@ class McapFile:
                 yield None
 
     def _of(self, part: bytes, wanted: frozenset[int]) -> list[McapMessage]:
-        found = []
-        for kind, content in _records_in(part):
-            if kind == _MESSAGE and len(content) >= _MESSAGE_HEAD.size:
-                channel, _, stamp, _ = _MESSAGE_HEAD.unpack_from(content)
+        # Every message passes here: a generator of records would cost as much as all else.
+        found, place, end = [], 0, len(part)
+        record, head = _RECORD_HEAD.unpack_from, _MESSAGE_HEAD.unpack_from
+        while place + _RECORD_HEAD.size <= end:
+            kind, length = record(part, place)
+            begin = place + _RECORD_HEAD.size
+            place = begin + length
+            if place > end:
+                break
+            if kind == _MESSAGE and length >= _MESSAGE_HEAD.size:
+                channel, _, stamp, _ = head(part, begin)
                 if channel in wanted:
-                    found.append(McapMessage(channel, stamp, bytes(content[_MESSAGE_HEAD.size :])))
+                    data = part[begin + _MESSAGE_HEAD.size : place]
+                    found.append(McapMessage(channel, stamp, data))
         return found
 
     def _surveyed(self) -> Survey:
         self.survey = survey = Survey()
         before = latest = 0
+        record, head = _RECORD_HEAD.unpack_from, _MESSAGE_HEAD.unpack_from
         for number, part in enumerate(self._parts()):
             if part is None:
                 continue
-            before, whole = latest, 0
-            for kind, content in _records_in(part):
-                whole += _RECORD_HEAD.size + len(content)
-                if kind == _SCHEMA:
-                    self._note_schema(content)
-                elif kind == _CHANNEL:
-                    self._note_channel(content)
-                elif kind == _MESSAGE and len(content) >= _MESSAGE_HEAD.size:
-                    channel, _, stamp, _ = _MESSAGE_HEAD.unpack_from(content)
+            before, place, end = latest, 0, len(part)
+            # As in `_of`, without a generator.
+            while place + _RECORD_HEAD.size <= end:
+                kind, length = record(part, place)
+                begin = place + _RECORD_HEAD.size
+                if begin + length > end:
+                    break
+                place = begin + length
+                if kind == _MESSAGE and length >= _MESSAGE_HEAD.size:
+                    channel, _, stamp, _ = head(part, begin)
                     survey.found[channel] += 1
-                    latest = max(latest, stamp)
+                    if stamp > latest:
+                        latest = stamp
                     if stamp < before:
                         survey.in_order = False
-            if whole < len(part):
+                elif kind == _SCHEMA:
+                    self._note_schema(memoryview(part)[begin:place])
+                elif kind == _CHANNEL:
+                    self._note_channel(memoryview(part)[begin:place])
+            if place < end:
                 survey.cut.add(number)
         return survey
 
@@ -370,19 +384,6 @@ def _unpacked(chunk: bytes) -> bytes:
     if check and zlib.crc32(records) != check:
         raise _DamagedError
     return records
-
-
-def _records_in(part: bytes) -> Iterator[tuple[int, memoryview]]:
-    """Kind and content of each whole record."""
-    view = memoryview(part)
-    place = 0
-    while place + _RECORD_HEAD.size <= len(view):
-        kind, length = _RECORD_HEAD.unpack_from(view, place)
-        place += _RECORD_HEAD.size
-        if place + length > len(view):
-            return
-        yield kind, view[place : place + length]
-        place += length
 
 
 def _text(content: memoryview, place: int) -> tuple[str, int]:
