@@ -38,7 +38,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import loads
-from rebt_ros.commands.shell import aligned, directory, parse, run, use_color
+from rebt_ros.commands.shell import aligned, count, directory, parse, run, use_color
 from rebt_ros.drawing.svg import render_svg
 from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import RebtError
@@ -88,10 +88,10 @@ class Plan:
 def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="demo", description=__doc__.splitlines()[0])
-    parser.add_argument("--demonstrations", type=int, default=ENOUGH, help="default: %(default)s")
+    parser.add_argument("--demonstrations", type=count, default=ENOUGH, help="default: %(default)s")
     parser.add_argument(
         "--trials",
-        type=int,
+        type=count,
         default=6,
         help="runs of each driver to compare (default: %(default)s)",
     )

@@ -24,6 +24,7 @@ from rebt_ros.commands.shell import (
     parse,
     run,
     use_color,
+    word_of,
 )
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
@@ -158,15 +159,14 @@ def _add_rows(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
     )
     rows.add_argument(
         "--reaction-time",
-        type=_seconds,
+        type=_amount,
         metavar="SECONDS|auto",
         help="how late the demonstrator acted, to be undone before learning; auto: read off the "
         "demonstrations where rows are samples, else 0 (default: auto)",
     )
     rows.add_argument(
         "--upsample",
-        type=Upsampling,
-        choices=list(Upsampling),
+        type=word_of(Upsampling),
         default=defaults.upsample,
         metavar=_values(Upsampling),
         help="make up rows for rare actions, for decision trees to be fitted to and never judged "
@@ -190,7 +190,7 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
     )
     learning.add_argument(
         "--ccp-alpha",
-        type=_ccp_alpha,
+        type=_amount,
         metavar="ALPHA|auto",
         help="complexity parameter of pruning, larger means smaller trees; auto: the largest "
         "tree whose mean recall of the actions in cross-validation is not clearly below the best, "
@@ -211,8 +211,7 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
     )
     learning.add_argument(
         "--psa",
-        type=Use,
-        choices=list(Use),
+        type=word_of(Use),
         metavar=_values(Use),
         help="whether PSA nodes stand in the tree; auto: where they raise agreement in "
         "cross-validation (default: auto)",
@@ -234,8 +233,7 @@ def _add_vocabulary(parser: argparse.ArgumentParser) -> None:
     )
     learning.add_argument(
         "--differences",
-        type=Use,
-        choices=list(Use),
+        type=word_of(Use),
         metavar=_values(Use),
         help="whether the tree may compare two features, as in left < right; auto: where that "
         "makes it a quarter smaller at the same agreement (default: auto)",
@@ -245,7 +243,7 @@ def _add_vocabulary(parser: argparse.ArgumentParser) -> None:
 def _add_form(parser: argparse.ArgumentParser) -> None:
     form = parser.add_argument_group("form of the tree")
     form.add_argument(
-        "--root", type=Root, choices=list(Root), metavar=_values(Root), help="(default: selector)"
+        "--root", type=word_of(Root), metavar=_values(Root), help="(default: selector)"
     )
     form.add_argument(
         "--attach",
@@ -256,8 +254,7 @@ def _add_form(parser: argparse.ArgumentParser) -> None:
     )
     form.add_argument(
         "--psa-as",
-        type=PsaChoice,
-        choices=list(PsaChoice),
+        type=word_of(PsaChoice),
         metavar=_values(PsaChoice),
         help="turn all PSA nodes into this (default: leave the choice open)",
     )
@@ -353,15 +350,21 @@ def _values(kind: type[Enum]) -> str:
 
 
 def _depth(text: str) -> int | Literal["auto"]:
-    return "auto" if text in ("auto", "none") else int(text)
+    if text in ("auto", "none"):
+        return "auto"
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a whole number nor auto") from None
 
 
-def _ccp_alpha(text: str) -> float | Literal["auto"]:
-    return "auto" if text == "auto" else float(text)
-
-
-def _seconds(text: str) -> float | Literal["auto"]:
-    return "auto" if text == "auto" else float(text)
+def _amount(text: str) -> float | Literal["auto"]:
+    if text == "auto":
+        return "auto"
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a number nor auto") from None
 
 
 def _unit(text: str) -> tuple[str, str]:
@@ -372,7 +375,7 @@ def _unit(text: str) -> tuple[str, str]:
 
 
 def _history(text: str) -> History | Literal["auto"]:
-    return "auto" if text == "auto" else History(text)
+    return "auto" if text == "auto" else word_of(History, "auto")(text)
 
 
 def _options(parsed: argparse.Namespace) -> LearnOptions:

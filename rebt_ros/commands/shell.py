@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from enum import Enum
 from pathlib import Path
+from typing import TypeVar
 
 from rebt_ros import streams
 from rebt_ros.commands.progress import ProgressBar
@@ -21,6 +24,8 @@ from rebt_ros.verification.robot_rules import rules_of
 
 #: Exit codes of a failure that the user can mend, and of Ctrl-C (128 + SIGINT).
 _FAILED, _INTERRUPTED = 1, 130
+
+_Word = TypeVar("_Word", bound=Enum)
 
 
 def parse(
@@ -59,7 +64,37 @@ def directory(text: str) -> Path:
     """The type of an option that names a directory to write to."""
     if not text.strip():
         raise argparse.ArgumentTypeError("a directory needs a name: name one, or leave it out")
-    return Path(text)
+    path = Path(text)
+    with contextlib.suppress(OSError):
+        for one in (path, *path.parents):
+            if one.exists() and not one.is_dir():
+                raise argparse.ArgumentTypeError(f"{one} is no directory: name another place")
+    return path
+
+
+def count(text: str) -> int:
+    """The type of an option that says how many, one at least."""
+    if not (text.isascii() and text.isdecimal() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of things: name 1 or more")
+    return int(text)
+
+
+def word_of(kind: type[_Word], *others: str) -> Callable[[str], _Word]:
+    """The type of an option that takes one of a few words, each the value of an enum's member.
+
+    Args:
+        kind: The enum.
+        others: Words that the option takes besides, for its refusals.
+    """
+
+    def read(text: str) -> _Word:
+        try:
+            return kind(text)
+        except ValueError:
+            known = ", ".join((*others, *(str(member.value) for member in kind)))
+            raise argparse.ArgumentTypeError(f"{text!r} is none of {known}") from None
+
+    return read
 
 
 def use_color() -> bool:
@@ -111,8 +146,7 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
     )
     tables.add_argument(
         "--rows",
-        type=RowKind,
-        choices=list(RowKind),
+        type=word_of(RowKind),
         metavar="|".join(kind.value for kind in RowKind),
         help="what a row is: an action from its beginning to its end, or a sample of one that is "
         "held (default: event where a column LABEL.outcome says how actions ended, else sample)",

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import add_seed, aligned, directory, parse, run
+from rebt_ros.commands.shell import add_seed, aligned, directory, parse, run, word_of
 from rebt_ros.errors import InputError
 from rebt_ros.storage.atomic import StorageError, write_text_atomically
 from rebt_ros.storage.bag_writer import BagStorage, new_bag
@@ -81,10 +81,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--bag",
-        type=BagStorage,
+        type=word_of(BagStorage),
         nargs="?",
         const=BagStorage.MCAP,
-        choices=list(BagStorage),
         metavar="|".join(one.value for one in BagStorage),
         help=f"also write a rosbag2 bag, DIR/{_BAG}, with every tick's state "
         "(default: none; without a value: mcap)",

@@ -26,40 +26,66 @@ class TreeVersions:
         self._directory = directory
         self._most = most
 
-    def keep(self, document: str) -> Path:
+    def keep(self, document: str, put: Callable[[str], object] = lambda document: None) -> Path:
         """Adds a tree that is published; one that is the newest already is not added again.
+
+        Args:
+            document: The tree.
+            put: Puts it where it is used; where that fails it is not added.
 
         Raises:
             StorageError: It cannot be written, or an old one not be removed.
         """
         numbered = self._numbered()
         if numbered and self._text(numbered[-1]) == document:
+            put(document)
             return numbered[-1]
         number = max((_number(one) for one in self._all()), default=0) + 1
         path = self._directory / f"{number:06}{_SUFFIX}"
+        self._tidy()
         write_text_atomically(path, document)
         try:
-            for old in [*self._numbered()[: -self._most], *self._all(_UNDONE)[: -self._most]]:
-                old.unlink(missing_ok=True)
-        except OSError as err:
-            raise StorageError(f"{self._directory} cannot be tidied ({err.strerror}).") from err
+            put(document)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
         return path
+
+    def _tidy(self) -> None:
+        """Makes room for another one."""
+        old = [*self._numbered()[: 1 - self._most], *self._all(_UNDONE)[: -self._most]]
+        try:
+            for one in old:
+                one.unlink(missing_ok=True)
+        except OSError as err:
+            raise StorageError(
+                f"{self._directory} cannot be tidied ({err.strerror or err}): see that you may "
+                "write there."
+            ) from err
 
     def go_back(self, accept: Callable[[str], object] = lambda document: None) -> tuple[Path, str]:
         """Takes the newest one out, which stays as a file, and returns the one before it.
 
         Args:
-            accept: Raises an error if it does not accept the one before, and nothing is changed.
+            accept: Raises an error if it does not accept the one before, or cannot put it in
+                place, and nothing is changed.
 
         Raises:
             InputError: There is none before it, or it cannot be read.
+            StorageError: The newest one cannot be taken out.
         """
         numbered = self._numbered()
         if len(numbered) < 2:
             raise InputError(f"there is no tree before this one in {self._directory}.")
         document = read_text(numbered[-2])
         accept(document)
-        numbered[-1].rename(numbered[-1].with_suffix(f"{_SUFFIX}{_UNDONE}"))
+        try:
+            numbered[-1].rename(numbered[-1].with_suffix(f"{_SUFFIX}{_UNDONE}"))
+        except OSError as err:
+            raise StorageError(
+                f"{numbered[-1]} cannot be renamed ({err.strerror or err}), and stays the newest "
+                "tree: name a place where you may write."
+            ) from err
         return numbered[-2], document
 
     def _numbered(self) -> list[Path]:

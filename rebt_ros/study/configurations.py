@@ -29,6 +29,8 @@ def configuration_paths(directory: Path) -> tuple[Path, ...]:
     Raises:
         InputError: There are none.
     """
+    if not directory.is_dir():
+        raise InputError(f"{directory} is no directory: name one of configuration files, *.json.")
     paths = sorted(directory.glob("*.json"), key=lambda path: in_order(path.stem))
     if not paths:
         raise InputError(f"{directory} has no configuration files: name a directory of *.json.")

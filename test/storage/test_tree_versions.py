@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rebt_ros.errors import InputError
+from rebt_ros.storage.atomic import StorageError
 from rebt_ros.storage.tree_versions import TreeVersions
 
 
@@ -47,3 +48,19 @@ def test_a_tree_before_that_is_not_accepted_changes_nothing(tmp_path: Path) -> N
     with pytest.raises(InputError, match=r"one breaks a rule\."):
         versions.go_back(refuse)
     assert versions.go_back() == (tmp_path / "000001.json", "one")
+
+
+def test_a_tree_that_cannot_be_put_in_place_leaves_all_versions_as_they_are(tmp_path: Path) -> None:
+    versions = TreeVersions(tmp_path, 5)
+    versions.keep("one")
+    versions.keep("two")
+
+    def refuse(document: str) -> None:
+        raise StorageError(f"there is no room for {document}.")
+
+    with pytest.raises(StorageError, match=r"no room for three\."):
+        versions.keep("three", refuse)
+    with pytest.raises(StorageError, match=r"no room for one\."):
+        versions.go_back(refuse)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["000001.json", "000002.json"]
+    assert versions.go_back()[1] == "one"

@@ -230,11 +230,8 @@ class LearnerNode(Node):
                 response.message = f"busy: {self._call}; call again when that is done."
                 return response
             try:
-                path, document = self._versions().go_back(
-                    lambda before: self._keeping_rules(loads(before))
-                )
+                path, document = self._versions().go_back(self._put_in_place)
                 learned = loads(document)
-                write_text_atomically(self._settings.output() / _TREE_FILE, document)
             except (RebtError, OSError) as err:
                 response.message = str(err)
                 return response
@@ -245,6 +242,15 @@ class LearnerNode(Node):
         self._last = Report(Level.OK, response.message)
         self.get_logger().info(response.message)
         return response
+
+    def _put_in_place(self, document: str) -> None:
+        """Makes a tree that was published before the one on disk.
+
+        Raises:
+            RebtError: It is not proven to keep the rules, or cannot be written.
+        """
+        self._keeping_rules(loads(document))
+        write_text_atomically(self._settings.output() / _TREE_FILE, document)
 
     def _on_proposal(self, message: String) -> None:
         """Publishes a tree that a person made, if it keeps its rules, and says how that went."""
@@ -334,8 +340,7 @@ class LearnerNode(Node):
         Raises:
             StorageError: It cannot be written.
         """
-        write_text_atomically(path, document)
-        version = self._versions().keep(document)
+        version = self._versions().keep(document, lambda new: write_text_atomically(path, new))
         self._figures = figures
         self._publish(learned, document)
         return version

@@ -487,7 +487,7 @@ class RecorderNode(Node):
             level = Level.WARN if problems else Level.OK
             return Report(level, "; ".join(("not recording", *problems)), values)
         if self._faults.recent or problems:
-            recent = [self._faults.recent] if self._faults.recent else []
+            recent = [self._faults.recent.rstrip(".")] if self._faults.recent else []
             return Report(Level.WARN, "; ".join((*recent, *problems)), values)
         if silent:
             return Report(Level.WARN, f"no messages on {', '.join(silent)}", values)
