@@ -152,7 +152,7 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
     from rebt_ros.learning.options import LearnOptions
     from rebt_ros.offline.result import OfflineLearning
     from rebt_ros.storage.recording import read_recording
-    from rebt_ros.storage.recording_files import recordings
+    from rebt_ros.storage.recording_files import no_recordings, recordings
 
     twice = set(request.binary_features) & set(request.categorical_features)
     if twice:
@@ -180,7 +180,8 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
     demonstrations = [read.demonstration for read in reads]
     kept = _ruled(pipeline.side_by_side(learnings), request, demonstrations)
     learned = kept.learned
-    notes = [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
+    notes = list(no_recordings(Path(request.demonstrations)))
+    notes += [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
     notes += [note for learning in learnings for note in learning.notes]
     led = {
         f"{learning.table.channel}: " if len(learnings) > 1 else "": learning.report

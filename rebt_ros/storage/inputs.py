@@ -20,7 +20,7 @@ from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording import read_recording
 from rebt_ros.storage.recording_files import SUFFIX, is_recording
 from rebt_ros.storage.robot_bag import read_robot_bag
-from rebt_ros.storage.sources import Strange, sources_of
+from rebt_ros.storage.sources import Strange, passed_over, sources_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +86,7 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         tuple(read.demonstration for read in reads),
         (
             *_notes_on_cache(gathered, options),
+            *passed_over(inputs, {one.path for one in sources}),
             *(
                 f"{name}: {note}"
                 for name, read in zip(names, reads, strict=True)

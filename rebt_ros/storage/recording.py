@@ -157,6 +157,11 @@ class RecordingWriter:
             return
         try:
             self.sync()
+            if not self._is_there():
+                raise RecordingError(
+                    f"{self.path} was moved or removed while it was written: its {self.rows} rows "
+                    "are not there."
+                )
         finally:
             descriptor, self._descriptor = self._descriptor, None
             with contextlib.suppress(OSError):
@@ -209,6 +214,14 @@ class RecordingWriter:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+    def _is_there(self) -> bool:
+        """Whether the file is still where it was created."""
+        assert self._descriptor is not None
+        try:
+            return os.path.samestat(self.path.stat(), os.fstat(self._descriptor))
+        except OSError:
+            return False
 
     def _append(self, content: bytes) -> None:
         if self._descriptor is None:

@@ -16,6 +16,9 @@ MARK: Final = b"# rebt_ros recording "
 #: Longer first lines are refused, so that a file that is no recording is not read as a whole.
 LONGEST_LINE: Final = 1 << 24
 
+#: How many names a message lists.
+_LISTED: Final = 8
+
 
 def recordings(directory: Path) -> tuple[Path, ...]:
     """The recordings in a directory, oldest first; other files are passed over.
@@ -23,18 +26,42 @@ def recordings(directory: Path) -> tuple[Path, ...]:
     Raises:
         InputError: There is no such directory, or there is no recording in it.
     """
+    found = tuple(file for file in _named_so(directory) if is_recording(file))
+    if not found:
+        why = "".join(f" ({note})" for note in no_recordings(directory))
+        raise InputError(f"{directory} holds no recordings{why}: record a demonstration first.")
+    return found
+
+
+def no_recordings(directory: Path) -> tuple[str, ...]:
+    """Which files in a directory are called like recordings and are none, in a sentence if any.
+
+    No full stop.
+
+    Raises:
+        InputError: There is no such directory.
+    """
+    others = [file.name for file in _named_so(directory) if not is_recording(file)]
+    if not others:
+        return ()
+    if len(others) == 1:
+        return (f"{others[0]} does not begin like a recording and is left out",)
+    listed = ", ".join(others[:_LISTED]) + (", ..." if len(others) > _LISTED else "")
+    return (f"{len(others)} files do not begin like recordings and are left out: {listed}",)
+
+
+def is_named_so(path: Path) -> bool:
+    """Whether a file is called like a recording, in capitals or not."""
+    return path.suffix.lower() == SUFFIX and path.is_file()
+
+
+def _named_so(directory: Path) -> list[Path]:
     try:
-        files = sorted(
-            path for path in directory.iterdir() if path.suffix == SUFFIX and path.is_file()
-        )
+        return sorted(filter(is_named_so, directory.iterdir()))
     except NotADirectoryError as err:
         raise InputError(f"{directory} is not a directory: name one with recordings.") from err
     except OSError as err:
         raise unreadable(directory, err) from err
-    found = tuple(file for file in files if is_recording(file))
-    if not found:
-        raise InputError(f"{directory} holds no recordings: record a demonstration first.")
-    return found
 
 
 def is_recording(path: Path) -> bool:

@@ -174,7 +174,9 @@ def read_rows(path: Path, file: BinaryIO, head: Head) -> Read:
         notes.append("its last row is incomplete and left out")
         left_out["are incomplete"] = 1
     if damaged >= 0:
-        notes.append(f"its last {seen - damaged} records are damaged and left out")
+        count = seen - damaged
+        what = "record is" if count == 1 else f"{count} records are"
+        notes.append(f"its last {what} damaged and left out")
         left_out["are damaged"] = seen - damaged
     shown = columns.demonstration()
     stated, sound_ones = seen + bool(rest), damaged if damaged >= 0 else seen

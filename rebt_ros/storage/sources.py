@@ -7,7 +7,7 @@ A directory stands for what is in it, a pattern such as `fleet/*/run_?` for what
 from __future__ import annotations
 
 import glob
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -16,11 +16,20 @@ from rebt_ros.errors import InputError
 from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
 from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.input_options import InputKind, Source
-from rebt_ros.storage.recording_files import SUFFIX, is_recording, recordings
+from rebt_ros.storage.recording_files import is_named_so, is_recording, no_recordings, recordings
 from rebt_ros.storage.text import unreadable
 
 #: Suffixes of tables, in lower case.
 _TABLES = frozenset({".csv", ".tsv"})
+
+#: Ends of names of what may be demonstrations and is not read, in lower case.
+_UNREAD = (
+    *(f"{suffix}{packed}" for suffix in (".csv", ".tsv") for packed in (".gz", ".bz2", ".xz")),
+    *(".bag", ".xlsx", ".xls", ".ods", ".parquet", ".feather", ".zip"),
+)
+
+#: How many names a message lists.
+_MOST_NAMES = 8
 
 #: How an input begins that is a list of inputs.
 _LIST: Final = "@"
@@ -65,6 +74,53 @@ def sources_of(inputs: Sequence[Path], *, strict: bool = True) -> list[Source | 
             found.append(Strange(path, err))
     _check_distinct([one.path for one in found])
     return found
+
+
+def passed_over(inputs: Sequence[Path], taken: Set[Path]) -> Iterator[str]:
+    """Notes what in directories looks like demonstrations and is not among those taken."""
+    for path in _expanded(inputs):
+        if path.is_dir() and not is_bag(path):
+            yield from (f"{path}: {note}" for note in _passed_over(path, taken))
+
+
+def _passed_over(directory: Path, taken: Set[Path]) -> Iterator[str]:
+    yield from no_recordings(directory)
+    others = [
+        path
+        for path in sorted(directory.iterdir())
+        if path not in taken and not path.name.startswith(".") and not is_named_so(path)
+    ]
+    if below := list(filter(_holds_demonstrations, others)):
+        yield f"demonstrations in directories in it are left out: {_names(below)}"
+    if files := list(filter(_may_be_demonstration, others)):
+        yield f"what else may be demonstrations is left out: {_names(files)}"
+
+
+def _holds_demonstrations(directory: Path) -> bool:
+    """Whether there are demonstrations in a directory, or bags in it."""
+    if not directory.is_dir():
+        return False
+    try:
+        return is_bag(directory) or any(
+            is_bag(path) if path.is_dir() else _may_be_demonstration(path)
+            for path in directory.iterdir()
+        )
+    except OSError:
+        return False
+
+
+def _may_be_demonstration(path: Path) -> bool:
+    """Whether a file's name is one of a demonstration, also of kinds that are not read."""
+    return path.is_file() and (
+        is_named_so(path)
+        or holds_messages(path)
+        or path.name.lower().endswith((*_TABLES, *_UNREAD))
+    )
+
+
+def _names(paths: Sequence[Path]) -> str:
+    more = ", ..." if len(paths) > _MOST_NAMES else ""
+    return ", ".join(path.name for path in paths[:_MOST_NAMES]) + more
 
 
 def has_table_suffix(file: Path) -> bool:
@@ -136,9 +192,7 @@ def _within(directory: Path) -> Iterator[Source]:
     """The demonstrations in a directory that is no bag: recordings, bags or tables."""
     inside = sorted(directory.iterdir())
     bags = [path for path in inside if path.is_dir() and is_bag(path)]
-    recorded = (
-        path for path in inside if path.suffix == SUFFIX and path.is_file() and is_recording(path)
-    )
+    recorded = (path for path in inside if is_named_so(path) and is_recording(path))
     if first := next(recorded, None):
         if bags:
             raise InputError(
@@ -149,6 +203,12 @@ def _within(directory: Path) -> Iterator[Source]:
         return
     tables = [path for path in inside if has_table_suffix(path) and path.is_file()]
     if not bags and not tables:
+        below = [one for one in inside if _holds_demonstrations(one)]
+        if below and not any(map(is_named_so, inside)):
+            raise InputError(
+                f"{directory} holds directories with demonstrations ({_names(below)}): name those "
+                "to read."
+            )
         yield from (Source(recording, InputKind.RECORDING) for recording in recordings(directory))
         return
     if bags and tables:

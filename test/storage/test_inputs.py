@@ -122,6 +122,59 @@ def test_what_is_something_else_is_named_with_what_helps(tmp_path, begin, why, n
         load([tmp_path / name])
 
 
+def _damaged(directory: Path) -> str:
+    path = write_recording(directory)
+    path.write_bytes(b"?" + path.read_bytes()[1:])
+    return path.name
+
+
+def _touched(directory: Path, *files: str) -> str:
+    for name in files:
+        (directory / name).parent.mkdir(exist_ok=True)
+        (directory / name).write_text("x,a\n1,go\n2,turn\n")
+    return files[0].split("/")[0]
+
+
+@pytest.mark.parametrize(
+    ("beside", "said"),
+    [
+        (_damaged, "{} does not begin like a recording and is left out"),
+        (lambda one: _touched(one, "empty.REC"), "{} does not begin like a recording"),
+        (lambda one: [_damaged(one) for _ in range(9)][-1], "9 files do not begin like recordings"),
+        (lambda one: _touched(one, "a.csv"), "may be demonstrations is left out: {}"),
+        (lambda one: _touched(one, "a.csv.gz", "b.xlsx"), "is left out: {}, b.xlsx"),
+        (lambda one: _touched(one, "more/a.csv"), "in directories in it are left out: {}"),
+        (lambda one: _touched(one, "README.txt", ".hidden.csv"), ""),
+    ],
+)
+def test_what_is_passed_over_in_a_directory_is_named(tmp_path, beside, said):
+    write_recording(tmp_path)
+    name = beside(tmp_path)
+    loaded = load([tmp_path])
+    assert len(loaded.demonstrations) == 1
+    if not said:
+        assert loaded.notes == ()
+        return
+    [note] = loaded.notes
+    assert note.startswith(f"{tmp_path}: ")
+    assert said.format(name) in note
+
+
+def test_a_directory_without_recordings_says_what_is_there(tmp_path):
+    _touched(tmp_path, "one/a.csv")
+    _touched(tmp_path, "two/a.rec")
+    with pytest.raises(InputError, match=r"with demonstrations \(one, two\): name those"):
+        load([tmp_path])
+    with pytest.raises(InputError, match=r"no recordings \(a\.rec does not begin like a recording"):
+        load([tmp_path / "two"])
+
+
+def test_a_recording_may_end_in_capitals(tmp_path):
+    path = write_recording(tmp_path)
+    path.rename(path.with_suffix(".REC"))
+    assert len(load([tmp_path]).demonstrations) == 1
+
+
 def test_a_recording_is_told_by_its_first_line_not_by_its_name(tmp_path):
     path = write_recording(tmp_path).rename(tmp_path / "mine.txt")
     assert names(load([path])) == ["mine.txt"]

@@ -266,6 +266,17 @@ def test_a_real_full_disk_is_an_error(tmp_path, monkeypatch):
         RecordingWriter(tmp_path, FEATURES, ["/action"])
 
 
+def test_a_recording_that_was_moved_before_its_end_is_not_said_to_be_there(tmp_path):
+    for move in (Path.unlink, lambda path: path.rename(tmp_path / "elsewhere")):
+        writer = RecordingWriter(tmp_path / "shown", FEATURES, ["/action"])
+        writer.write(Row(1, "/action", "go", None, (0.0,) * len(FEATURES)))
+        move(writer.path)
+        with pytest.raises(RecordingError, match="its 1 rows are not there"):
+            writer.close()
+        # It is closed all the same.
+        writer.close()
+
+
 def test_rows_are_not_acknowledged_into_a_removed_file(tmp_path):
     with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:
         writer.path.unlink()
@@ -439,7 +450,7 @@ def test_a_changed_byte_of_a_record_is_noticed(tmp_path_factory, data):
     if in_last:
         read = read_recording(path)
         assert len(read.demonstration) == 2
-        assert read.notes == ("its last 1 records are damaged and left out",)
+        assert read.notes == ("its last record is damaged and left out",)
     else:
         with pytest.raises(InputError, match="damaged: restore the file"):
             read_recording(path)
