@@ -33,7 +33,10 @@ def topic_of(base: str, channel: str, channels: Sequence[str]) -> str:
     try:
         validate_topic_name(topic)
     except InvalidTopicNameException as err:
-        raise DocumentError(f"the tree has the channel {channel!r}, an invalid name.") from err
+        raise DocumentError(
+            f"the tree has the channel {channel!r}, which is no name of a topic: rename the label "
+            "column, with letters, digits and underscores, and learn again."
+        ) from err
     return topic
 
 

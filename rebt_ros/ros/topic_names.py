@@ -43,7 +43,7 @@ def check_topics(node: Node, states: Iterable[str], commands: Iterable[str]) -> 
     for does, name, kind in wanted:
         full = _full_name(node, name)
         if full is None:
-            raise DocumentError(f"the tree {does} {name!r}, an invalid name.")
+            raise DocumentError(f"the tree {does} {name!r}, which is no name of a topic.")
         if types.setdefault(full, kind) is not kind:
             raise DocumentError(f"the tree {does} {name!r}, which carries something else.")
 

@@ -71,6 +71,8 @@ _MOST_TEXTS = 1000
 _LONGEST_UNIT = 12
 #: Every integer up to here is a number of its own.
 _LARGEST_EXACT = 2.0**53
+#: Of the largest number that is learned from.
+_MOST_DIGITS = 39
 _WITH_COMMAS, _WITHOUT_SEPARATORS = "with decimal commas", "without their thousands separators"
 
 
@@ -213,10 +215,12 @@ def _numeric(name: str, values: FloatArray, *notes: str, decimal_commas: bool = 
 def _rounded(name: str, cells: Sequence[str], values: FloatArray) -> Iterable[str]:
     """A note where integers are too long to be told apart."""
     for place in np.flatnonzero(np.abs(values) > _LARGEST_EXACT).tolist():
-        if cells[place].strip().lstrip("+-").isdecimal() and int(cells[place]) != int(
-            values[place]
-        ):
-            yield f"column {name!r} holds integers such as {cells[place]}, which are rounded"
+        cell = cells[place].strip()
+        digits = cell.lstrip("+-").lstrip("0")
+        # Python reads no integer of thousands of digits, and no such number is learned from.
+        exact = int(digits) if digits.isdecimal() and len(digits) <= _MOST_DIGITS else None
+        if exact is not None and exact != abs(int(values[place])):
+            yield f"column {name!r} holds integers such as {cell}, which are rounded"
             return
 
 

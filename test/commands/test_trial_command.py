@@ -411,7 +411,7 @@ def test_a_tree_that_the_executor_refuses_is_named(domain: int, peer: Peer, tmp_
     ):
         running.ends(peer, 1)
     assert "executor refuses odd.json" in running.err
-    assert "an invalid name" in running.err
+    assert "is no name of a topic" in running.err
 
 
 def test_names_can_be_remapped(domain: int, peer: Peer, tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ SIZES: Final = {
     "tables": 50_000,
     "experiments": 50_000,
     "bags": 20_000,
+    "robot_bags": 5_000,
     # One in twenty is a mutated message, which the middleware drops.
     executor.TARGET: 11_000,
 }

@@ -501,6 +501,15 @@ def test_integers_that_are_rounded_are_noted(tmp_path: Path) -> None:
     ]
 
 
+def test_a_number_may_have_thousands_of_digits(tmp_path: Path) -> None:
+    read = _read(tmp_path, f"x,a\n{'0' * 5000}7,go\n-{'0' * 5000}{2**60 + 1},turn\n")
+    assert read.demonstration.states[:, 0].tolist() == [7.0, -(2.0**60)]
+    assert any("which are rounded" in note for note in read.notes)
+    for zeros in ("0" * 5000, ""):
+        with pytest.raises(InputError, match=r"must lie within ±1e\+38"):
+            _read(tmp_path, f"x,a\n{zeros}{'9' * 5000},go\n3,turn\n")
+
+
 def test_why_there_is_no_feature_is_said(tmp_path: Path) -> None:
     text = "".join(f"1_{place}00,go\n" for place in range(10, 40))
     with pytest.raises(InputError, match=r"feature \(column 'x' holds 30 different texts"):

@@ -84,7 +84,7 @@ class Preparation:
                 validate_topic_name(one)
             except InvalidTopicNameException as err:
                 raise DocumentError(
-                    f"the tree reads the state topic {one!r}, an invalid name."
+                    f"the tree reads the state topic {one!r}, which is no name of a topic."
                 ) from err
         _check_measurable(learned, inputs.topics)
         histories = {

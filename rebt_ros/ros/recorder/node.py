@@ -394,7 +394,11 @@ class RecorderNode(Node):
         stamp = self._stamp(now)
         self._queue(now, lambda: done.set_result(command(request, stamp)))
         answer = await done
-        self.get_logger().info(answer.message)
+        # On two lines: rclpy refuses another severity from the same one.
+        if answer.success:
+            self.get_logger().info(answer.message)
+        else:
+            self.get_logger().warning(answer.message)
         response.success, response.message = answer
         return response
 
