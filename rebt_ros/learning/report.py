@@ -9,7 +9,7 @@ conflict
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,9 @@ from rebt_ros.learning.judged_levels import JudgedLevels
 #: rho): 0.6 where trees of the same demonstrations were compared, 0.2 over sets and numbers of
 #: demonstrations in docs/driving.md.
 FORECAST = "a weak one: rank correlation with success 0.2 to 0.6 within a task"
+
+#: So many actions are listed in a sentence.
+_LISTED = 12
 
 #: Odd numbers that stir hashes of states.
 _GOLDEN, _ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD6E8FEB86659FD93)
@@ -71,6 +74,13 @@ class LearningReport:
                     f"the tree never takes {action.label!r}, which was shown {action.rows} "
                     f"{'times' if action.rows > 1 else 'time'}"
                 )
+        alike: dict[str, list[str]] = {}
+        for action in self.actions:
+            alike.setdefault(" ".join(action.label.casefold().split()), []).append(action.label)
+        for same in alike.values():
+            if len(same) > 1:
+                named = ", ".join(map(repr, same))
+                yield f"{named} are different actions: write them alike if they are one"
         if self.conflicts > _MENTIONED * self.rows:
             left = (
                 f" ({self.conflicts_after_history} also after the same action)"
@@ -83,16 +93,19 @@ class LearningReport:
             )
 
     def in_short(self) -> str:
-        """A sentence for a service's answer; empty where nothing was judged."""
+        """Sentences for a service's answer: recalls, the least first, and what to hold against."""
+        simplest = f"always taking the most frequent action would reach {self.most_frequent:.1%}"
         if self.mean_recall is None or self.agreement is None:
-            return ""
-        worst = min(
-            self.actions, key=lambda action: 1.0 if action.recall is None else action.recall
-        )
-        return (
-            f"Forecast: {self.agreement:.1%} agreement in cross-validation ({FORECAST}); mean "
-            f"recall {self.mean_recall:.1%}, least {worst.recall:.1%} of {worst.label!r}."
-        )
+            said = f"There is no forecast, as there are too few rows; {simplest}."
+        else:
+            judged = [(one.recall, one.label) for one in self.actions if one.recall is not None]
+            recalls = [f"{recall:.1%} of {label!r}" for recall, label in sorted(judged)]
+            said = (
+                f"Forecast: {self.agreement:.1%} agreement in cross-validation ({FORECAST}), where "
+                f"{simplest}; mean recall {self.mean_recall:.1%}: {_listed(recalls)}."
+            )
+        never = [repr(one.label) for one in self.actions if not one.taken]
+        return f"{said} Never taken: {_listed(never)}." if never else said
 
     def as_json(self) -> dict[str, Any]:
         """For summary.json."""
@@ -191,6 +204,10 @@ def _conflicts(situations: IntArray, chosen: IntArray) -> int:
     np.minimum.at(least, of_row, chosen)
     np.maximum.at(most, of_row, chosen)
     return int(np.sum((least != most)[of_row]))
+
+
+def _listed(words: Sequence[str]) -> str:
+    return ", ".join(words[:_LISTED]) + (", ..." if len(words) > _LISTED else "")
 
 
 def _share(value: float | None) -> str:

@@ -187,7 +187,7 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
         f"{learning.table.channel}: " if len(learnings) > 1 else "": learning.report
         for learning in learnings
     }
-    sentences = [f"{channel}{one.in_short()}" for channel, one in led.items() if one.in_short()]
+    sentences = [f"{channel}{one.in_short()}" for channel, one in led.items()]
     accounts = {read.demonstration.name: read.account for read in reads if read.account}
     result = OfflineLearning(learned, learnings, tuple(notes), accounts, kept.rules)
     lesson = Lesson(

@@ -248,19 +248,12 @@ def _doubts(actions: Sequence[str], events: int) -> list[str]:
         for action in actions
         if is_maybe_missing(action)
     ]
-    alike: dict[str, list[str]] = {}
-    for action in actions:
-        alike.setdefault(" ".join(action.casefold().split()), []).append(action)
     if len(actions) > _MANY_ACTIONS and 2 * len(actions) > events:
         notes.append(
             f"{len(actions)} different actions in {events} rows, such as {actions[0]!r}, hardly "
             "recur, and each is an action of its own: name the label column if it is another"
         )
-    return notes + [
-        f"{', '.join(map(repr, same))} are different actions: write them alike if they are one"
-        for same in alike.values()
-        if len(same) > 1
-    ]
+    return notes
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning.judged_levels import JudgedLevels
-from rebt_ros.learning.report import FORECAST, LearningReport, report_on
+from rebt_ros.learning.report import FORECAST, ActionReport, LearningReport, report_on
 from rebt_ros.logic.conditions import Literal, PreviousActionIs
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
@@ -131,14 +131,28 @@ def test_a_few_conflicts_of_very_many_rows_are_not_mentioned() -> None:
     assert list(report.notes()) == []
 
 
-def test_a_sentence_names_the_forecast_and_the_worst_action() -> None:
+def test_the_answer_names_the_forecast_what_to_hold_against_it_and_each_recall() -> None:
     shown = rows_of([float(n) for n in range(12)], [0] * 8 + [2] * 4)
     report = reported(shown, GO, levels=LEVELS, ccp_alpha=0.1)
     assert report.in_short() == (
-        f"Forecast: 50.0% agreement in cross-validation ({FORECAST}); mean recall 37.5%, "
-        "least 0.0% of 'turn'."
+        f"Forecast: 50.0% agreement in cross-validation ({FORECAST}), where always taking the most "
+        "frequent action would reach 66.7%; mean recall 37.5%: 0.0% of 'turn', 75.0% of 'go'. "
+        "Never taken: 'turn'."
     )
-    assert reported(shown).in_short() == ""
+    assert reported(shown).in_short() == (
+        "There is no forecast, as there are too few rows; always taking the most frequent action "
+        "would reach 66.7%. Never taken: 'turn'."
+    )
+
+
+def test_actions_that_may_be_the_same_are_noted() -> None:
+    actions = ("GO", "go", "go ", "stop", "turn")
+    report = LearningReport(
+        tuple(ActionReport(one, 1, None, taken=True) for one in actions), None, None, 0.2, 0, 0, 5
+    )
+    assert list(report.notes()) == [
+        "'GO', 'go', 'go ' are different actions: write them alike if they are one"
+    ]
 
 
 def test_nothing_is_said_of_recall_where_nothing_was_judged() -> None:

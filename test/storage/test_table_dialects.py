@@ -422,13 +422,10 @@ def test_a_text_that_says_none_is_a_text(tmp_path: Path) -> None:
     assert read.demonstration.features[0].categories == ("cup", "none")
 
 
-def test_actions_that_may_be_none_or_the_same_are_noted(tmp_path: Path) -> None:
+def test_actions_that_may_be_none_are_noted(tmp_path: Path) -> None:
     read = _read(tmp_path, "x,a\n1,GO\n2,go\n3,None\n4,turn\n5,GO\n")
     assert len(read.demonstration) == 5
-    assert read.notes == (
-        "'None' is taken for an action: leave cells without one empty",
-        "'GO', 'go' are different actions: write them alike if they are one",
-    )
+    assert read.notes == ("'None' is taken for an action: leave cells without one empty",)
 
 
 def test_a_last_column_of_numbers_beside_words_is_noted(tmp_path: Path) -> None:
