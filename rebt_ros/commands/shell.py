@@ -72,6 +72,13 @@ def directory(text: str) -> Path:
     return path
 
 
+def _input(text: str) -> Path:
+    """The type of an argument that names what is read: an unset variable of a shell does not."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("an input needs a name: name a file or a directory")
+    return Path(text)
+
+
 def count(text: str) -> int:
     """The type of an option that says how many, one at least."""
     if not (text.isascii() and text.isdecimal() and int(text) > 0):
@@ -126,7 +133,7 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
     parser.add_argument(
         "inputs",
         nargs="+" if required else "*",
-        type=Path,
+        type=_input,
         metavar="INPUT",
         help="a rosbag2 bag (directory, .mcap or .db3), a recording of the recorder, a CSV table, "
         "a directory of any of them, a pattern such as 'fleet/*', or @FILE with such an input in "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from enum import Enum
 from numbers import Integral, Real
 from typing import Any
@@ -104,8 +104,15 @@ class LearnOptions:
     """Whether Sequences and Repeaters are looked for in rows that share one state."""
     psa_choice: PsaChoice | None = None
     """What to turn all PSA nodes into; None to leave them to the user."""
+    last_action: InitVar[object] = None
+    """The paper's word for what `history` says, for a refusal that tells so."""
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, last_action: object) -> None:
+        if last_action is not None:
+            raise OptionError(
+                "what the tree may test of the last action is the option history: say 'none', "
+                "'previous' or 'last' there, or leave it to choose."
+            )
         self._take_words()
         self._take_numbers()
         self._take_the_others()

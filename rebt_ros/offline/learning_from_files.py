@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, unmeasurable
@@ -13,7 +14,7 @@ from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.drawing.text import render_text
-from rebt_ros.errors import InputError
+from rebt_ros.errors import InputError, OptionError
 from rebt_ros.learning import pipeline
 from rebt_ros.learning.learning_file import write_learning
 from rebt_ros.learning.levels import check_most_levels
@@ -38,6 +39,8 @@ from rebt_ros.verification.errors import BrokenRuleError, RuleError
 from rebt_ros.verification.rules import RuleSet
 from rebt_ros.verification.ruling import Ruled, ruled
 
+_Options = TypeVar("_Options", LearnOptions, InputOptions)
+
 #: Names that ROS 2 has for topics.
 _TOPIC = re.compile(r"/?(?:[A-Za-z_]\w*/)*[A-Za-z_]\w*", re.ASCII)
 
@@ -54,7 +57,7 @@ def learn(
     out: str | Path | None = None,
     options: LearnOptions | None = None,
     reading: InputOptions | None = None,
-    declared: Mapping[str, FeatureKind] | None = None,
+    declared: Mapping[str, FeatureKind | str] | None = None,
     levels: bool = False,
     most_levels: int = 100,
     rules: str | Path | None = None,
@@ -83,14 +86,17 @@ def learn(
         RebtError: An input cannot be used, an option makes no sense, or the tree is not proven to
             keep its rules; nothing was written.
     """
-    options = options or LearnOptions()
+    options = _checked("options", options or LearnOptions(), LearnOptions)
+    reading = _checked("reading", reading or InputOptions(), InputOptions)
+    declared = _kinds(declared or {})
+    if out is not None and not (isinstance(out, str | Path) and str(out).strip()):
+        raise OptionError(f"out must name a directory, not {out!r}: name one, or leave it out.")
     if levels:
         check_most_levels(most_levels)
     given = rules_for(rules)
     progress("reading", 0.0)
     paths = as_paths(inputs)
-    reading = reading or InputOptions()
-    loaded = load(paths, replace(reading, features=reading.features | frozenset(declared or ())))
+    loaded = load(paths, replace(reading, features=reading.features | frozenset(declared)))
     tables = tuple(
         replace(table, robot=loaded.robot) for table in tabulate(loaded.demonstrations, declared)
     )
@@ -114,6 +120,27 @@ def learn(
         result = write_files(Path(out), result, paths, options, most, writing)
     progress("done", 1.0)
     return result
+
+
+def _checked(name: str, value: object, kind: type[_Options]) -> _Options:
+    if not isinstance(value, kind):
+        raise OptionError(f"{name} must be {kind.__name__}, not {value!r}.")
+    return value
+
+
+def _kinds(declared: object) -> dict[str, FeatureKind]:
+    """Kinds of features, also by their words, such as ``{"docked": "binary"}``."""
+    if not isinstance(declared, Mapping):
+        raise OptionError(f"declared must be kinds by names of features, not {declared!r}.")
+    words = [kind.value for kind in FeatureKind]
+    kinds = {}
+    for name, kind in declared.items():
+        if not isinstance(kind, FeatureKind) and kind not in words:
+            raise OptionError(
+                f"the kind of {name!r} must be one of {', '.join(words)}, not {kind!r}."
+            )
+        kinds[name] = FeatureKind(kind)
+    return kinds
 
 
 def write_files(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import RowKind
+from rebt_ros.errors import OptionError
 from rebt_ros.robot_file.robot_file import RobotFile
 
 
@@ -91,3 +92,43 @@ class InputOptions:
     """Of bags, where features and actions are in messages of any type, instead of topics."""
     plan: ReadingPlan = field(default_factory=ReadingPlan)
     """By which means they are read."""
+
+    def __post_init__(self) -> None:
+        """Takes a word for a tuple of it, and words for enums.
+
+        Raises:
+            OptionError: A value is of another type.
+        """
+        for name in ("labels", "channels", "action_topics"):
+            object.__setattr__(self, name, _texts(name, getattr(self, name)))
+        topics = self.state_topics
+        several = (topics,) if isinstance(topics, str | StateTopic) else topics
+        object.__setattr__(
+            self,
+            "state_topics",
+            tuple(StateTopic(one) if isinstance(one, str) else one for one in several),
+        )
+        kinds = {kind.value: kind for kind in RowKind}
+        if isinstance(self.row_kind, str) and self.row_kind in kinds:
+            object.__setattr__(self, "row_kind", kinds[self.row_kind])
+        rate = self.sample_rate
+        named = all(isinstance(one, StateTopic) for one in self.state_topics)
+        for name, fits, what in (
+            ("state_topics", named, "names"),
+            ("row_kind", isinstance(self.row_kind, RowKind | None), f"one of {', '.join(kinds)}"),
+            ("header", isinstance(self.header, bool), "True or False"),
+            ("skip_bad", isinstance(self.skip_bad, bool), "True or False"),
+            ("sample_rate", rate is None or isinstance(rate, int | float), "a number or None"),
+            ("robot", isinstance(self.robot, RobotFile | None), "a RobotFile or None"),
+            ("plan", isinstance(self.plan, ReadingPlan), "a ReadingPlan"),
+        ):
+            if not fits:
+                raise OptionError(f"{name} must be {what}, not {getattr(self, name)!r}.")
+
+
+def _texts(name: str, value: object) -> tuple[str, ...]:
+    """A text, or several of them, as a tuple."""
+    several = (value,) if isinstance(value, str) else value
+    if not isinstance(several, list | tuple) or not all(isinstance(one, str) for one in several):
+        raise OptionError(f"{name} must be texts, not {value!r}.")
+    return tuple(several)

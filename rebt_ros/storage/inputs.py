@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -40,8 +40,18 @@ class Loaded:
 
 
 def as_paths(inputs: Sequence[str | Path] | str | Path) -> tuple[Path, ...]:
-    """Inputs as people name them in Python: several, or the only one."""
-    return tuple(map(Path, [inputs] if isinstance(inputs, str | Path) else inputs))
+    """Inputs as people name them in Python: several, or the only one.
+
+    Raises:
+        InputError: One is no path.
+    """
+    several = [inputs] if isinstance(inputs, str | Path) else inputs
+    if not isinstance(several, Iterable) or isinstance(several, bytes):
+        raise InputError(f"{inputs!r} is no input: name a bag, a recording or a CSV table.")
+    for one in several:
+        if not isinstance(one, str | Path) or not str(one).strip():
+            raise InputError(f"{one!r} is no input: name a bag, a recording or a CSV table.")
+    return tuple(map(Path, several))
 
 
 def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:

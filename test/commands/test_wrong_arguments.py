@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import rebt_ros
+from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.commands import experiment, generate, learn, simulate
+from rebt_ros.demonstration.builder import StateTopic
+from rebt_ros.demonstration.demonstration import RowKind
+from rebt_ros.errors import RebtError
 
 COMMANDS: Mapping[str, Callable[[list[str]], None]] = {
     "experiment": experiment.main,
@@ -55,3 +62,63 @@ def test_what_an_argument_cannot_be_is_said_in_words(
     assert not output.out
     # Names of Python are no words of a user.
     assert "_" not in output.err.splitlines()[-1].replace(str(tmp_path), "")
+
+
+def test_an_input_without_a_name_is_not_the_current_directory(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit):
+        learn.main(["", "--out", "x"])
+    assert "an input needs a name" in capsys.readouterr().err
+
+
+def _learn(inputs: Any = "nowhere.csv", **options: Any) -> None:
+    rebt_ros.learn(inputs, **options)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: _learn(5), "5 is no input"),
+        (lambda: _learn(None), "None is no input"),
+        (lambda: _learn(b"x.csv"), "b'x.csv' is no input"),
+        (lambda: _learn(["x.csv", None]), "None is no input"),
+        (lambda: _learn(""), "'' is no input"),
+        (lambda: _learn(out=""), "out must name a directory, not ''"),
+        (lambda: _learn(out=3), "out must name a directory, not 3"),
+        (lambda: _learn(options={"delta": 0.2}), "options must be LearnOptions"),
+        (lambda: _learn(reading={"labels": "a"}), "reading must be InputOptions"),
+        (lambda: _learn(declared={"x": "truth"}), "the kind of 'x' must be one of numeric, binary"),
+        (lambda: _learn(declared="x"), "declared must be kinds by names"),
+        (lambda: rebt_ros.InputOptions(labels=5), "labels must be texts, not 5"),
+        (lambda: rebt_ros.InputOptions(action_topics=[None]), "action_topics must be texts"),
+        (lambda: rebt_ros.InputOptions(state_topics=[3]), "state_topics must be names"),
+        (lambda: rebt_ros.InputOptions(row_kind="rows"), "row_kind must be one of event, sample"),
+        (lambda: rebt_ros.InputOptions(header="no"), "header must be True or False, not 'no'"),
+        (lambda: rebt_ros.InputOptions(sample_rate="10"), "sample_rate must be a number or None"),
+        (lambda: rebt_ros.InputOptions(robot="robot.yaml"), "robot must be a RobotFile or None"),
+        (lambda: rebt_ros.LearnOptions(last_action="never"), "is the option history: say 'none'"),
+    ],
+)
+def test_what_a_call_cannot_take_is_said_in_a_sentence(
+    call: Callable[[], object], said: str
+) -> None:
+    with pytest.raises(RebtError) as refused:
+        call()
+    assert said in str(refused.value)
+    assert str(refused.value).endswith(".")
+
+
+def test_a_word_stands_for_a_tuple_of_it_and_for_an_enum() -> None:
+    options = rebt_ros.InputOptions(
+        labels="a", channels=["b", "c"], action_topics="/d", state_topics="/e", row_kind="event"
+    )
+    assert (options.labels, options.channels, options.action_topics) == (
+        ("a",),
+        ("b", "c"),
+        ("/d",),
+    )
+    assert options.state_topics == (StateTopic("/e"),)
+    assert options.row_kind is RowKind.EVENT
+    assert replace(options, header=False).labels == ("a",)
+    assert replace(rebt_ros.LearnOptions(root="parallel"), delta=0.1).root is Root.PARALLEL
