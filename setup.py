@@ -105,9 +105,18 @@ setup(
         "driving": [f"gymnasium{'[box2d]' * (machine() == 'x86_64')}>=1", "minigrid>=3"],
         # BehaviorTree.CPP in Python, to test exported trees: wheels for one kind of processor.
         "engines": ["behaviortreepy>=0.1.4"] if machine() == "x86_64" else [],
+        "groot2": ["pyzmq>=25"],
         "pictures": ["matplotlib>=3.6"],
         "studio": ["aiohttp>=3.9", "plotly>=5"],
-        "test": ["hypothesis", "jsonschema>=4.10", "pytest", "pytest-xdist>=3", "selenium>=4"],
+        # btview watches as Groot2 does, independently of us.
+        "test": [
+            "btview>=0.2",
+            "hypothesis",
+            "jsonschema>=4.10",
+            "pytest",
+            "pytest-xdist>=3",
+            "selenium>=4",
+        ],
         "upsampling": ["imbalanced-learn>=0.12"],
     },
     cmdclass={"install_scripts": InstallScripts},

@@ -91,6 +91,7 @@ HOMES: Final = {
     ),
     "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
     "yaml": ("rebt_ros.robot_file.*", "rebt_ros.verification.rules_file"),
+    "zmq": ("rebt_ros.live.groot2_server",),
 }
 
 #: Run code that comes from data, or read formats that do.

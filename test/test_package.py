@@ -38,7 +38,7 @@ DECLARED_AS: Final = {
 }
 
 #: Imported only where they are installed.
-OPTIONAL: Final = {"aiohttp", "distributed", "imblearn", "matplotlib"}
+OPTIONAL: Final = {"aiohttp", "distributed", "imblearn", "matplotlib", "zmq"}
 
 needs_installation = pytest.mark.skipif(
     INSTALLED == CHECKOUT / PACKAGE, reason="run from the checkout, not by 'make test'"

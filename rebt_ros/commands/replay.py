@@ -30,18 +30,26 @@ def main(arguments: list[str] | None = None) -> None:
         metavar="N",
         help="how many disagreements to list (default: %(default)s)",
     )
+    parser.add_argument(
+        "--btlog",
+        type=Path,
+        metavar="FILE",
+        help="also write what each node did in each row, as a .btlog for Groot2",
+    )
     parsed = parse(parser, arguments)
     run(lambda: _replay(parsed), "replay")
 
 
 def _replay(parsed: argparse.Namespace) -> None:
-    results = replay(parsed.tree, parsed.inputs, reading=input_options(parsed))
+    results = replay(parsed.tree, parsed.inputs, reading=input_options(parsed), btlog=parsed.btlog)
     for place, result in enumerate(results):
         if place:
             print()
         if len(results) > 1:
             print(f"Channel {result.channel}:")
         _print(result, max(parsed.disagreements, 0))
+    if parsed.btlog is not None:
+        print(f"\nWhat each node did is in {parsed.btlog}.")
 
 
 def _print(result: Replay, most: int) -> None:

@@ -20,7 +20,6 @@ same order, whatever the state and however each action ends.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -32,31 +31,9 @@ from rebt_ros.behavior_tree.wording import Wording, summary
 from rebt_ros.errors import DocumentError
 from rebt_ros.export import scripts
 from rebt_ros.export.blackboard import Variable, texts, variables
-from rebt_ros.export.identifiers import identifiers
+from rebt_ros.export.elements import TREE, action_names, add_actions, one_line
 from rebt_ros.export.memory import Memory, memories
 from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
-
-#: The name of the exported tree.
-TREE = "LearnedTree"
-
-#: Names of nodes and elements of BehaviorTree.CPP, from 4.0 to 4.10, that no action can have.
-_BUILT_IN = frozenset(
-    re.findall(
-        r"\w+",
-        """
-        Action AlwaysFailure AlwaysRunning AlwaysSuccess AsyncFallback AsyncSequence BehaviorTree
-        BlackboardCheckBool Condition Control Decorator Delay EntryUpdatedAction
-        EntryUpdatedDecorator Fallback FallbackStar Finally ForceFailure ForceSuccess ID IfThenElse
-        Inverter KeepRunningUntilFailure LoopBool LoopDouble LoopInt LoopString ManualSelector
-        Metadata MetadataFields Parallel ParallelAll PopBool PopDouble PopInt PopString Precondition
-        ReactiveFallback ReactiveSequence Repeat RetryUntilSuccesful RetryUntilSuccessful Root
-        RunOnce Script ScriptCondition Sequence SequenceStar SequenceWithMemory SetBlackboard
-        SkipUnlessUpdated Sleep SubTree SubTreePlus Switch2 Switch3 Switch4 Switch5 Switch6 TestNode
-        Timeout TreeNodesModel TryCatch UnsetBlackboard WaitValueUpdate WasEntryUpdated WhileDoElse
-        include name root LearnedTree
-        """,
-    )
-)
 
 
 def to_btcpp(learned: LearnedTree) -> str:
@@ -93,7 +70,7 @@ class _Export:
             labels,
             learned.row_kind,
         )
-        self._ids = _ids(nodes.actions(self._tree))
+        self._ids = action_names(nodes.actions(self._tree))
 
     def text(self) -> str:
         root = Element("root", BTCPP_format="4", main_tree_to_execute=TREE)
@@ -109,7 +86,7 @@ class _Export:
         # A Parallel does not tick children that have ended, and so none may end.
         side_by_side = Element("Parallel", success_count="-1", failure_count="1")
         for channel, tree in self._policies.items():
-            forever = SubElement(side_by_side, "KeepRunningUntilFailure", name=_line(channel))
+            forever = SubElement(side_by_side, "KeepRunningUntilFailure", name=one_line(channel))
             SubElement(forever, "ForceSuccess").append(
                 self._node(tree, self._memories.get(channel))
             )
@@ -136,7 +113,7 @@ class _Export:
             case nodes.Condition(literal=literal):
                 return Element(
                     "ScriptCondition",
-                    name=_line(self._wording.literal(literal)),
+                    name=one_line(self._wording.literal(literal)),
                     code=self._code(literal, memory),
                 )
             case nodes.Action():
@@ -169,7 +146,7 @@ class _Export:
     def _action(self, action: nodes.Action) -> Element:
         """The action, by its own name: BehaviorTree.CPP 4.8 refuses <Action> in some places."""
         element = Element(self._ids[action])
-        if (name := _line(self._wording.node(action))) != element.tag:
+        if (name := one_line(self._wording.node(action))) != element.tag:
             element.set("name", name)
         memory = self._memories.get(action.channel)
         if memory is None or not (noted := memory.act(action.label)):
@@ -181,28 +158,11 @@ class _Export:
         return both
 
     def _model(self, models: Element) -> None:
-        for action, name in self._ids.items():
-            fields = SubElement(SubElement(models, "Action", ID=name), "MetadataFields")
-            SubElement(fields, "Metadata", label=_line(action.label))
-            SubElement(fields, "Metadata", channel=_line(action.channel))
+        add_actions(models, self._ids)
         ports = SubElement(models, "SubTree", ID=TREE)
         for variable in self._variables.values():
             port = SubElement(ports, "input_port", name=variable.name, type=variable.type)
-            port.text = _line(variable.meaning)
-
-
-def _ids(actions: Iterable[nodes.Action]) -> dict[nodes.Action, str]:
-    """A name for each action, which is its label where that is possible."""
-    actions = tuple(actions)
-    labels = [action.label for action in actions]
-    names = {
-        action: action.label
-        if labels.count(action.label) == 1
-        else repr((action.label, action.channel))
-        for action in actions
-    }
-    found = identifiers(names.values(), "action", _BUILT_IN)
-    return {action: found[name] for action, name in names.items()}
+            port.text = one_line(variable.meaning)
 
 
 def _refuse_what_can_run(node: nodes.Parallel) -> None:
@@ -221,13 +181,6 @@ def _assign(element: Element, attribute: str, assignments: Iterable[str]) -> Non
     """Sets an attribute to a script, where there is anything to do."""
     if script := "; ".join(assignments):
         element.set(attribute, script)
-
-
-def _line(text: str) -> str:
-    """A text as one line without what XML cannot hold."""
-    return "".join(
-        one if one.isprintable() else one.encode("unicode_escape").decode() for one in text
-    )
 
 
 def _serialized(root: Element) -> str:

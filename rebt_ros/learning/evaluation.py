@@ -13,7 +13,7 @@ agreement, own-history
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -29,7 +29,7 @@ from rebt_ros.behavior_tree.prediction import (
     choose,
     history_columns,
 )
-from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
+from rebt_ros.behavior_tree.runtime import Tick, TreeRuntime, executable
 from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
@@ -108,24 +108,36 @@ def _ticked_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
     learned = LearnedTree(
         table.features, tuple(actions), tree, _NOT_LEARNED, row_kind=table.row_kind
     )
-    runtime = TreeRuntime(learned)
-    history = runtime.histories.setdefault(table.channel, ActionHistory())
     chosen: list[int] = []
+    for _, tick in ticks(TreeRuntime(learned), table):
+        commands = [command for command in tick.commands if command.channel == table.channel]
+        known = commands and commands[0].label in table.actions
+        chosen.append(table.actions.index(commands[0].label) if known else NO_ACTION)
+    return np.array(chosen, dtype=np.int64)
+
+
+def ticks(runtime: TreeRuntime, table: DemonstrationTable) -> Iterator[tuple[bool, Tick]]:
+    """Ticks a tree once in each row; its history begins with each demonstration's.
+
+    Args:
+        runtime: Runs the tree; its features are those of the table.
+        table: The rows.
+
+    Yields:
+        Of each row, whether a demonstration begins with it, and the tick.
+    """
+    own = runtime.histories.setdefault(table.channel, ActionHistory())
     for row, (starts, state) in enumerate(
         zip(_starts(table).tolist(), table.states.tolist(), strict=True)
     ):
         if starts:
             runtime.halt()
-            history.clear()
+            for history in runtime.histories.values():
+                history.clear()
             for label in _recent_at(row, table):
-                history.begin(label)
-            history.previous = _label(table, table.previous[row])
-        commands = [
-            command for command in runtime.tick(state).commands if command.channel == table.channel
-        ]
-        known = commands and commands[0].label in table.actions
-        chosen.append(table.actions.index(commands[0].label) if known else NO_ACTION)
-    return np.array(chosen, dtype=np.int64)
+                own.begin(label)
+            own.previous = _label(table, table.previous[row])
+        yield starts, runtime.tick(state)
 
 
 def decision_tree_choices(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rebt_ros.storage.btlog import read_btlog
 from rebt_ros.storage.tree_file import read_tree
 
 #: Runs a module as a program where nothing of ROS can be imported.
@@ -147,8 +148,11 @@ def test_two_label_columns_are_learned_and_replayed_as_two_channels(tmp_path: Pa
 def test_replay_shows_agreement_confusion_and_disagreements(learned: Path, table: Path) -> None:
     other = table.parent / "other.csv"
     other.write_text(TABLE.replace("0.2,0,turn", "0.2,0,go", 1))
-    done = run("replay", learned / "tree.json", other)
+    logged = table.parent / "other.btlog"
+    done = run("replay", learned / "tree.json", other, "--btlog", logged)
     assert done.returncode == 0, done.stderr
+    assert done.stdout.endswith(f"\nWhat each node did is in {logged}.\n")
+    assert read_btlog(logged).transitions
     assert "98.75%" in done.stdout
     lines = done.stdout.splitlines()
     header = next(line for line in lines if line.startswith("shown"))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final, Protocol
 
 from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.export.watched import WatchedTree
 from rebt_ros.live.last_tick import LastTick
 from rebt_ros.live.novelty_guard import NoveltyGuard
 from rebt_ros.live.takeover import Takeover
@@ -18,6 +19,19 @@ from rebt_ros.ros.executor.tree_program import TreeProgram
 
 #: What states outside what was shown are counted as.
 NOVEL: Final = "states outside what was shown"
+
+
+class Watcher(Protocol):
+    """Is told what runs, and what it does; see `Watching`."""
+
+    def show(self, tree: WatchedTree | None) -> None:
+        """Another tree runs."""
+
+    def tick(self, outcomes: Mapping[int, str], state: Sequence[float]) -> None:
+        """The tree was ticked."""
+
+    def rest(self) -> None:
+        """The tree was halted."""
 
 
 class Driving:
@@ -33,6 +47,7 @@ class Driving:
         histories: What was taken on each channel, by whatever tree or person.
         faults: Told of states outside what was shown.
         say: Told whether the robot is in the tree's hands, whenever that changes.
+        watching: Told what runs, and what it does.
     """
 
     def __init__(
@@ -43,12 +58,14 @@ class Driving:
         histories: dict[str, ActionHistory],
         faults: Faults,
         say: Callable[[bool], None],
+        watching: Watcher,
     ) -> None:
         self._clock = clock
         self._channels = channels
         self._histories = histories
         self._faults = faults
         self._say = say
+        self._watching = watching
         self._said: bool | None = None
         self._halt_action = settings.halt_action
         self._guard = NoveltyGuard(settings.novelty.mode)
@@ -84,6 +101,7 @@ class Driving:
         self._guard.release()
         self._channels.follow(program.channels)
         before, self.program = self.program, program
+        self._watching.show(program.watched)
         return before
 
     def enable(self) -> None:
@@ -160,6 +178,7 @@ class Driving:
         self.commands += self._channels.send(commands)
         # The robot waits for its command, and nobody for this.
         self.last_tick = LastTick(program.learned, tuple(state), program.runtime.outcomes())
+        self._watching.tick(self.last_tick.outcomes, self.last_tick.values)
         self.ticks += 1
         self.longest = max(self.longest, time.perf_counter() - began)
 
@@ -178,6 +197,7 @@ class Driving:
             self._channels.begin_tick()
             self.program.runtime.halt()
             self.program.inputs.reset()
+            self._watching.rest()
         self._resting = True
 
     def _is_familiar(self, program: TreeProgram) -> bool:

@@ -30,6 +30,7 @@ from rebt_ros.ros.executor.state_topics import StateTopics
 from rebt_ros.ros.executor.tick_clock import TickClock
 from rebt_ros.ros.executor.tree_intake import TreeIntake
 from rebt_ros.ros.executor.tree_program import TreeProgram
+from rebt_ros.ros.executor.watching import Watching
 
 #: Time between two looks at what topics carry (seconds).
 _LOOK_PERIOD: Final = 0.5
@@ -42,16 +43,18 @@ class ExecutorNode(Node):
     """Ticks the latest tree at a fixed rate or, if asked for, as soon as a state arrives.
 
     Trees come in by `TreeIntake`, states by `StateTopics`, what a person does by `Persons`;
-    `Driving` has the tree's hands on the robot, and `Reporting` says how it goes.
+    `Driving` has the tree's hands on the robot, and `Reporting` says how it goes, and
+    `Watching` shows the tree to other programs.
 
     Raises:
-        RebtError: A parameter makes no sense, or the tree file cannot be used.
+        RebtError: A parameter makes no sense, or what it names cannot be used.
     """
 
     def __init__(self) -> None:
         super().__init__("executor")
         self._settings = settings = declare_settings(self)
         faults = Faults(self.get_logger())
+        self._watching = Watching(settings.watching)
         commands = (
             RobotCommands(
                 self, settings.robot, lambda text: faults.note("failed command", f"{text}.")
@@ -79,6 +82,7 @@ class ExecutorNode(Node):
             histories,
             faults,
             lambda driving: says.publish(Bool(data=driving)),
+            self._watching,
         )
         self._topics = StateTopics(self, clock.now, faults, self._on_state)
         self._intake = TreeIntake(
@@ -100,7 +104,15 @@ class ExecutorNode(Node):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_LOOK_PERIOD, self._look_at_publishers, clock=steady)
         self._reporting = Reporting(
-            self, settings, commands, channels, self._topics, self._driving, self._intake, faults
+            self,
+            settings,
+            commands,
+            channels,
+            self._topics,
+            self._driving,
+            self._intake,
+            faults,
+            self._watching,
         )
         self._driving.tell()
         self._begin()
@@ -122,6 +134,7 @@ class ExecutorNode(Node):
         """Interrupts what runs."""
         self._intake.close()
         self._driving.close()
+        self._watching.close()
 
     # --- what comes in ---
 

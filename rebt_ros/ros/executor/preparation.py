@@ -16,6 +16,7 @@ from rebt_ros.behavior_tree.novelty import NoveltyDetector
 from rebt_ros.behavior_tree.runtime import Commander, TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.errors import DocumentError
+from rebt_ros.export.watched import WatchedTree, watched
 from rebt_ros.live.tree_inputs import TreeInputs
 from rebt_ros.ros.command_channels import topic_of
 from rebt_ros.ros.executor.settings import ExecutorSettings
@@ -97,7 +98,15 @@ class Preparation:
             TreeRuntime(learned, self._commander, executable(learned.tree), histories),
             inputs,
             NoveltyDetector(learned, inputs.topics, topic, self._settings.novelty.margin),
+            _watched(learned) if self._settings.watching.watched else None,
         )
+
+
+def _watched(learned: LearnedTree) -> WatchedTree | None:
+    try:
+        return watched(learned)
+    except DocumentError:
+        return None
 
 
 def _check_channels(learned: LearnedTree) -> None:

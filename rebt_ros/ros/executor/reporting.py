@@ -18,6 +18,7 @@ from rebt_ros.ros.executor.robot_commands import RobotCommands
 from rebt_ros.ros.executor.settings import ExecutorSettings
 from rebt_ros.ros.executor.state_topics import StateTopics
 from rebt_ros.ros.executor.tree_intake import REFUSED, TreeIntake
+from rebt_ros.ros.executor.watching import Watching
 from rebt_ros.ros.graph_watch import Finding, GraphWatch
 
 #: Least time between two snapshots (seconds).
@@ -38,6 +39,7 @@ class Reporting:
         driving: Runs the tree.
         intake: Takes trees.
         faults: What went wrong.
+        watching: Shows the tree to programs.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class Reporting:
         driving: Driving,
         intake: TreeIntake,
         faults: Faults,
+        watching: Watching,
     ) -> None:
         self._settings = settings
         self._commands = commands
@@ -58,6 +61,7 @@ class Reporting:
         self._driving = driving
         self._intake = intake
         self._faults = faults
+        self._watching = watching
         self._watch = GraphWatch(node)
         self._last_snapshot = ""
         self._watchers = 0
@@ -142,7 +146,7 @@ class Reporting:
         awaited = self._intake.awaited
         if awaited is not None:
             values["the next tree waits for"] = ", ".join(awaited)
-        return values | self._faults.counts
+        return values | self._watching.values | self._faults.counts
 
     def _problems(self) -> list[str]:
         """What in the graph keeps the tree from driving, or makes it a matter of chance.
@@ -165,6 +169,7 @@ class Reporting:
                 for finding in watch.several(topic, "commands", _STOP_OTHERS)
             ),
             *self._without_command(),
+            *(Finding(problem, waits=False) for problem in self._watching.problems),
         ]
         if self._settings.learner:
             findings += watch.unheard([intake.documents])

@@ -35,6 +35,21 @@ class NoveltySettings:
 
 
 @dataclass(frozen=True, slots=True)
+class WatchingSettings:
+    """Who watches the tree while it runs."""
+
+    groot2_port: int
+    """Where Groot2's monitor is answered on this machine; 0 for nowhere."""
+    btlog_directory: Path | None
+    """Where a log of each tree is written; None for nowhere."""
+
+    @property
+    def watched(self) -> bool:
+        """Whether there is anyone."""
+        return bool(self.groot2_port) or self.btlog_directory is not None
+
+
+@dataclass(frozen=True, slots=True)
 class ExecutorSettings:
     """What the executor was started with; durations in nanoseconds."""
 
@@ -59,6 +74,7 @@ class ExecutorSettings:
     """Empty for none."""
     takeover: TakeoverSettings
     novelty: NoveltySettings
+    watching: WatchingSettings
 
 
 def declare_settings(node: Node) -> ExecutorSettings:
@@ -136,6 +152,7 @@ def declare_settings(node: Node) -> ExecutorSettings:
         )(),
         takeover=_takeover(declare),
         novelty=_novelty(declare),
+        watching=_watching(declare),
     )
     declare.refuse_others()
     return settings
@@ -186,3 +203,20 @@ def _novelty(declare: Parameters) -> NoveltySettings:
         100.0,
     )()
     return NoveltySettings(Novelty(mode), margin)
+
+
+def _watching(declare: Parameters) -> WatchingSettings:
+    port = declare.integer(
+        "groot2_port",
+        0,
+        "TCP port on which Groot2's monitor may watch the tree, from this machine only, such as "
+        "1667; 0 for none.",
+        0,
+        65535,
+    )()
+    directory = declare.text(
+        "btlog_directory",
+        "",
+        "Directory for a .btlog of each tree that runs, to be replayed in Groot2; empty for none.",
+    )()
+    return WatchingSettings(port, at_home("btlog_directory", directory) if directory else None)

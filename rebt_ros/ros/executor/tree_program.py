@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.novelty import NoveltyDetector
 from rebt_ros.behavior_tree.runtime import TreeRuntime
+from rebt_ros.export.watched import WatchedTree
 from rebt_ros.live.tree_inputs import TreeInputs
 
 
@@ -20,6 +21,8 @@ class TreeProgram:
     runtime: TreeRuntime
     inputs: TreeInputs
     novelty: NoveltyDetector
+    watched: WatchedTree | None
+    """As it is watched; None where nobody does, or where it is too large for that."""
 
     @property
     def learned(self) -> LearnedTree:
