@@ -235,6 +235,19 @@ def test_options_are_read_at_each_call(domain: int, peer: Peer, tmp_path: Path) 
         assert (refused.successful, "must be one of" in refused.reason) == (False, True)
 
 
+def test_it_learns_without_a_call_once_enough_demonstrations_have_ended(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    with NodeProcess("learner_node", domain, tmp_path, {"relearn_after": 2}) as learner:
+        heard = peer.listen(String, "behavior_tree", LATCHED)
+        learner.says("there is no tree")
+        for _ in range(2):
+            _record(tmp_path / "demonstrations")
+        assert _latest(peer, heard, 1).provenance.demonstrations == 3
+        learner.says("new demonstrations have ended (2): learning from all.")
+
+
 def test_a_second_call_is_refused_while_one_is_under_way(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:

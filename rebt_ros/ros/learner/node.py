@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
@@ -21,6 +23,7 @@ from rebt_ros.behavior_tree.document import dumps, loads
 from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.errors import RebtError
+from rebt_ros.live.ended_demonstrations import EndedDemonstrations
 from rebt_ros.live.keeping_rules import kept
 from rebt_ros.live.learning_process import (
     LearningCancelledError,
@@ -50,6 +53,9 @@ _THREADS: Final = 5
 #: What comes once nothing can be cancelled any more.
 _PUBLISHING: Final = Progress("publishing", 1.0)
 
+#: Time between two looks at the demonstrations (seconds).
+_LOOK: Final = 1.0
+
 #: So many notes are part of the answer; all of them are in the log.
 _NOTES_ANSWERED: Final = 3
 
@@ -76,6 +82,8 @@ class LearnerNode(Node):
         self._figures: Mapping[str, str] = {}
         self._watch = GraphWatch(self)
         self._settings = declare_settings(self)
+        self._ended = EndedDemonstrations()
+        self._count_ended()
         # On the second one an executor follows this learner, whoever else publishes trees.
         self._tree_publishers = [
             self.create_publisher(String, topic, TREE_QOS)
@@ -95,6 +103,12 @@ class LearnerNode(Node):
         self.create_service(Trigger, "~/relearn", self._relearn, callback_group=group)
         self.create_service(Trigger, "~/cancel", self._cancel, callback_group=group)
         self.create_service(Trigger, "~/rollback", self._rollback, callback_group=group)
+        self.create_timer(
+            _LOOK,
+            self._look_at_demonstrations,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
         self._answers = self.create_publisher(String, "~/proposal_answer", 10)
         self.create_subscription(String, "~/proposal", self._on_proposal, 1, callback_group=group)
 
@@ -108,6 +122,24 @@ class LearnerNode(Node):
         call = self._call
         if call is not None:
             call.over.wait(_LAST_ANSWER)
+
+    def _look_at_demonstrations(self) -> None:
+        """Learns anew where enough demonstrations have ended."""
+        ended = self._count_ended()
+        if ended and ended >= self._settings.relearn_after() and self._call is None:
+            self.get_logger().info(f"new demonstrations have ended ({ended}): learning from all.")
+            self._relearn(Trigger.Request(), Trigger.Response())
+
+    def _count_ended(self) -> int:
+        """How many demonstrations have ended that nothing was learned from, if that matters."""
+        try:
+            directory = self._settings.demonstrations()
+        except RebtError:
+            # A directory that makes no sense is told by ~/relearn.
+            return 0
+        return (
+            self._ended.look(directory, time.monotonic()) if self._settings.relearn_after() else 0
+        )
 
     def _relearn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         call = _Call()
@@ -156,6 +188,7 @@ class LearnerNode(Node):
 
     def _learn(self, call: _Call) -> str:
         """Learns, writes and publishes; returns what a person wants to know."""
+        self._ended.learn()
         request = self._settings.request(dumps(self._learned) if self._learned else "")
         path = self._settings.output() / _TREE_FILE
         lesson = self._process.ask(

@@ -40,6 +40,8 @@ class LearnerSettings:
     """Where tree.json is written to."""
     timeout: Callable[[], float]
     """How long learning may take, seconds; 0 for no limit."""
+    relearn_after: Callable[[], int]
+    """Ended demonstrations after which to learn without a call; 0 for never."""
     least_agreement: Callable[[], float]
     """With held-out rows; trees that agree less are not published."""
     only_better: Callable[[], bool]
@@ -96,6 +98,14 @@ def declare_settings(node: Node) -> LearnerSettings:
             "Learning that takes longer is stopped (seconds); 0.0 for no limit.",
             0.0,
             1e6,
+            fixed=False,
+        ),
+        relearn_after=declare.integer(
+            "relearn_after",
+            0,
+            "Learn anew, without a call, once so many demonstrations have ended; 0 for never.",
+            0,
+            100_000,
             fixed=False,
         ),
         least_agreement=declare.number(
