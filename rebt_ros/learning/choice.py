@@ -5,7 +5,8 @@ What cross-validation decides, it decides on rows that a tree was not learned fr
 - whether the tree may test the previous action: where that makes the explanation of the rows much
   simpler (see `FittedTree.explanation`), or as large with fewer comparisons of numbers, whatever
   cross-validation says, or makes it no larger and raises the mean recall of unpruned trees after
-  their own choices;
+  their own choices; of events that are sent when the action changes, which always differ from the
+  one before, only where states hardly tell what to do;
 - whether it may test differences of features, by agreement and size;
 - the pruning level, by mean recall, and by the size of the explanation where that leaves much open:
   pruning has to pay (see `judged_levels`);
@@ -29,7 +30,8 @@ from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.simplest import simplest
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.decision_tree.upsampling import Upsampling
-from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.demonstration import RowKind
+from rebt_ros.demonstration.last_action import NO_ACTION, History
 from rebt_ros.demonstration.table import DemonstrationTable, part_of
 from rebt_ros.errors import OptionError
 from rebt_ros.learning.chosen_policy import ChosenPolicy
@@ -50,6 +52,9 @@ _LARGE, _ROWS_THAT_TELL = 6_000, 2_000
 
 #: To which share the previous action has to bring the size of the explanation.
 _MUCH_SIMPLER = 0.8
+
+#: Share of events up to which it is hardly ever that an action follows itself.
+_HARDLY = 0.1
 
 #: How much agreement differences may cost, and to which share of the leaves they have to come.
 _DEARER, _SMALLER = 0.005, 0.75
@@ -176,6 +181,17 @@ def _size(fitted: FittedTree) -> str:
     return f"{fitted.leaves} leaves and {fitted.comparisons} comparisons of numbers"
 
 
+def _always_changes(table: DemonstrationTable) -> bool:
+    """Whether rows are events in which hardly an action follows itself, as where changes are sent.
+
+    The tree is ticked while an action lasts; these rows do not show how long that is.
+    """
+    if table.row_kind is not RowKind.EVENT:
+        return False
+    follows = int(np.count_nonzero(table.previous != NO_ACTION))
+    return int(np.count_nonzero(table.previous == table.chosen)) < _HARDLY * follows
+
+
 def _simpler(first: FittedTree, second: FittedTree) -> bool:
     """Whether a tree takes fewer comparisons of numbers than another one, and no more leaves."""
     return first.leaves <= second.leaves and first.comparisons < second.comparisons
@@ -225,6 +241,8 @@ class _Choice:
         with_it = Vocabulary(History.PREVIOUS)
         before, after = (self._fitted(one).explanation for one in (FEATURES_ALONE, with_it))
         compared = f"{after} leaves and exceptions explain the rows, {before} without it"
+        if _always_changes(self._telling):
+            return self._history_of_changes(compared)
         if after <= _MUCH_SIMPLER * before:
             self.reasons.append(f"The previous action is tested: {compared}.")
             return History.PREVIOUS
@@ -250,6 +268,27 @@ class _Choice:
             f"({recall:.1%}, {without:.1%} without it)."
         )
         return History.PREVIOUS if raised else History.NONE
+
+    def _history_of_changes(self, compared: str) -> History:
+        """Where the action of each row is another one than the previous action.
+
+        That is a part of what each row does, whatever the state: of two actions, all of it.  So the
+        size of an explanation by it tells nothing, and it is tested only where states hardly tell
+        what to do.
+        """
+        without, recall = (
+            self.judged(one, telling=True).unpruned().mean_recalls[0]
+            for one in (FEATURES_ALONE, Vocabulary(History.PREVIOUS))
+        )
+        by_chance = 1 / len(np.unique(self._telling.chosen))
+        tested = without < (by_chance + recall) / 2
+        self.reasons.append(
+            f"The previous action is {'tested' if tested else 'not tested'}: {compared}; each row "
+            f"is another action than the one before, and states alone "
+            f"{'hardly ' if tested else ''}tell which (mean recall {without:.1%}, {recall:.1%} "
+            "with it)."
+        )
+        return History.PREVIOUS if tested else History.NONE
 
     def _fitted(self, vocabulary: Vocabulary) -> FittedTree:
         """Fitted to the rows that tell what a tree may test."""

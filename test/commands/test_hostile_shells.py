@@ -184,7 +184,7 @@ def test_a_directory_without_a_name_is_refused(out: str, table: Path) -> None:
 
 def test_a_file_in_place_of_the_directory_is_named(table: Path) -> None:
     done = _run("learn", table, "--out", table)
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert str(table) in done.stderr
 

@@ -17,6 +17,7 @@ from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.simplest import simplest
 from rebt_ros.decision_tree.training import FitOptions, fit
+from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -475,6 +476,24 @@ def test_a_task_whose_states_alone_tell_nothing_gets_the_previous_action() -> No
     assert policy.fitted.vocabulary.history is History.PREVIOUS
     assert "2 leaves and exceptions" in policy.reasons[0]
     assert "41 without it" in policy.reasons[0]
+
+
+@pytest.mark.parametrize("kind", RowKind)
+@pytest.mark.parametrize("seed", range(3))
+def test_events_that_alternate_are_not_explained_by_that(seed: int, kind: RowKind) -> None:
+    # Turns between 3 and 6, and an event is sent when that begins and when it is over.
+    random = np.random.default_rng(seed)
+    numbers = [
+        random.uniform(3.2, 5.8) if row % 2 else random.choice([random.uniform(0, 2.8), 8.0])
+        for row in range(48)
+    ]
+    labels = ["go", "turn"] * 24
+    shown = table(numbers, labels, [row // 12 for row in range(48)])
+    policy = choose(replace(shown, row_kind=kind), LearnOptions())
+    needed = History.NONE if kind is RowKind.EVENT else History.PREVIOUS
+    assert policy.fitted.vocabulary.history is needed
+    if kind is RowKind.EVENT:
+        assert "each row is another action than the one before" in policy.reasons[0]
 
 
 def test_a_task_that_needs_none_does_not_get_it() -> None:
