@@ -303,5 +303,5 @@ def test_a_place_that_cannot_be_written_is_one_sentence(
     for bag in ((), ("--bag", "mcap")):
         with pytest.raises(SystemExit) as exited:
             run(config, "--ticks", "20", "--out", tmp_path / "file", *bag)
-        assert exited.value.code == 1
-        assert "cannot be written" in capsys.readouterr().err
+        assert exited.value.code == 2
+        assert "file is no directory: name another place" in capsys.readouterr().err
