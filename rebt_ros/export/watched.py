@@ -95,7 +95,7 @@ def watched(learned: LearnedTree) -> WatchedTree:
         )
     models = SubElement(root, "TreeNodesModel")
     add_actions(models, made.names)
-    SubElement(models, "Condition", ID=made.condition)
+    SubElement(models, "Condition", ID=_CONDITION)
     ElementTree.indent(root)
     tested = nodes.features(learned.tree)
     text = ElementTree.tostring(root, encoding="unicode")
@@ -115,7 +115,6 @@ class _Made:
 
     def __init__(self, learned: LearnedTree) -> None:
         self.nodes: list[WatchedNode] = []
-        self.condition = _CONDITION
         self.names = action_names(nodes.actions(executable(learned.tree)), (_CONDITION,))
         self._wording = Wording(learned)
         self._places = count()
@@ -125,7 +124,7 @@ class _Made:
         name, place = one_line(self._wording.node(node)), next(self._places)
         match node:
             case nodes.Condition():
-                kind = self.condition
+                kind = _CONDITION
             case nodes.Action():
                 kind = self.names[node]
             case nodes.Inverter():

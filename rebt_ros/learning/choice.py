@@ -259,9 +259,9 @@ class _Choice:
                     f"comparisons of numbers do instead of {states_alone.comparisons}."
                 )
                 return History.PREVIOUS
-        judged = [self.judged(one, telling=True).unpruned() for one in (FEATURES_ALONE, with_it)]
+        judged = self._unpruned()
         raised = clearly_raised(*judged)
-        without, recall = (one.mean_recalls[0] for one in judged)
+        without, recall = (levels.mean_recalls[0] for levels in judged)
         self.reasons.append(
             f"The previous action is {'tested' if raised else 'not tested'}: {compared}, and mean "
             f"recall after its own choices is {'' if raised else 'not '}clearly higher "
@@ -276,10 +276,7 @@ class _Choice:
         size of an explanation by it tells nothing, and it is tested only where states hardly tell
         what to do.
         """
-        without, recall = (
-            self.judged(one, telling=True).unpruned().mean_recalls[0]
-            for one in (FEATURES_ALONE, Vocabulary(History.PREVIOUS))
-        )
+        without, recall = (levels.mean_recalls[0] for levels in self._unpruned())
         by_chance = 1 / len(np.unique(self._telling.chosen))
         tested = without < (by_chance + recall) / 2
         self.reasons.append(
@@ -289,6 +286,14 @@ class _Choice:
             "with it)."
         )
         return History.PREVIOUS if tested else History.NONE
+
+    def _unpruned(self) -> tuple[JudgedLevels, JudgedLevels]:
+        """What unpruned trees are worth, by states alone and with the previous action."""
+        without, with_it = (
+            self.judged(vocabulary, telling=True).unpruned()
+            for vocabulary in (FEATURES_ALONE, Vocabulary(History.PREVIOUS))
+        )
+        return without, with_it
 
     def _fitted(self, vocabulary: Vocabulary) -> FittedTree:
         """Fitted to the rows that tell what a tree may test."""

@@ -40,9 +40,8 @@ class EndedDemonstrations:
                 self._directory, self._sizes, self._learned = directory, {}, found
             before, self._sizes = self._sizes, {}
             for name, size in found.items():
-                known = before.get(name)
-                same = known is not None and known[0] == size
-                self._sizes[name] = known if same and known is not None else (size, now)
+                known, since = before.get(name, (None, now))
+                self._sizes[name] = (size, since if size == known else now)
             return sum(
                 size != self._learned.get(name) and now - since >= QUIET
                 for name, (size, since) in self._sizes.items()

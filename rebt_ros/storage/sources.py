@@ -144,9 +144,7 @@ def _listed(file: Path) -> Iterator[Path]:
             raise InputError(f"{file} is too long for a list of inputs: name a shorter one.")
         lines = file.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as err:
-        raise InputError(
-            f"{file} is no list of inputs: write a path in each of its lines."
-        ) from err
+        raise _no_list(file) from err
     except OSError as err:
         raise unreadable(file, err) from err
     named = [line.strip() for line in lines]
