@@ -132,14 +132,13 @@ class LearnerNode(Node):
 
     def _count_ended(self) -> int:
         """How many demonstrations have ended that nothing was learned from, if that matters."""
+        if not self._settings.relearn_after():
+            return 0
         try:
-            directory = self._settings.demonstrations()
+            return self._ended.look(self._settings.demonstrations(), time.monotonic())
         except RebtError:
             # A directory that makes no sense is told by ~/relearn.
             return 0
-        return (
-            self._ended.look(directory, time.monotonic()) if self._settings.relearn_after() else 0
-        )
 
     def _relearn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         call = _Call()
