@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from rebt_ros.errors import OptionError, RebtError
+from rebt_ros.live.kept_recordings import KeptRecordings
 from rebt_ros.live.learning_process import Lesson, Progress, Request
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from rebt_ros.learning.learning import Learning
     from rebt_ros.learning.options import LearnOptions
     from rebt_ros.offline.result import OfflineLearning
+    from rebt_ros.storage.read import Read
     from rebt_ros.verification.ruling import Ruled
 
 #: Of all the work, what reading the recordings is.
@@ -53,6 +55,16 @@ class Learned:
     options: LearnOptions
 
 
+@dataclass(slots=True)
+class Known:
+    """What the process knows from one line to the next."""
+
+    recordings: KeptRecordings
+    """What was read."""
+    learned: Learned | None = None
+    """What was learned last, until its files are written: it may be large."""
+
+
 def main(node: int) -> None:
     """Learns until its input ends.
 
@@ -73,9 +85,9 @@ def main(node: int) -> None:
             os._exit(0)
 
     _warm_up()
-    learned: list[Learned] = []
+    known = Known(KeptRecordings(_read))
     for line in sys.stdin.buffer:
-        say(_reply(line, learned, lambda progress: say(asdict(progress))))
+        say(_reply(line, known, lambda progress: say(asdict(progress))))
 
 
 def _end_with(node: int) -> None:
@@ -106,21 +118,22 @@ def _warm_up() -> None:
         return
 
 
-def _reply(line: bytes, learned: list[Learned], tell: Tell) -> dict[str, Any]:
+def _reply(line: bytes, known: Known, tell: Tell) -> dict[str, Any]:
     """The reply to a line.
 
     Args:
         line: A request, or a call for the files of what was learned last.
-        learned: What was learned last, until its files are written: it may be large.
+        known: What is known from earlier lines.
         tell: Told how far a request is.
     """
     try:
         message = json.loads(line)
+        learned, known.learned = known.learned, None
         if "write" in message:
-            return {"notes": write(learned.pop(), Path(message["write"])) if learned else []}
-        learned.clear()
-        learned.append(learn(Request(**message), tell))
-        return asdict(learned[0].lesson)
+            return {"notes": write(learned, Path(message["write"])) if learned else []}
+        del learned
+        known.learned = learn(Request(**message), tell, known.recordings)
+        return asdict(known.learned.lesson)
     except RebtError as err:
         return {"error": str(err)}
     except ImportError as err:
@@ -135,12 +148,17 @@ def _reply(line: bytes, learned: list[Learned], tell: Tell) -> dict[str, Any]:
         }
 
 
-def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
+def learn(
+    request: Request,
+    tell: Tell = lambda progress: None,
+    recordings: KeptRecordings | None = None,
+) -> Learned:
     """Learns from all recordings of a directory, in this process.
 
     Args:
         request: What to learn.
         tell: Told how far it is.
+        recordings: What was read earlier, and is not read again; None for nothing.
 
     Raises:
         RebtError: They cannot be used, or an option makes no sense.
@@ -151,8 +169,8 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
     from rebt_ros.learning import pipeline
     from rebt_ros.learning.options import LearnOptions
     from rebt_ros.offline.result import OfflineLearning
-    from rebt_ros.storage.recording import read_recording
-    from rebt_ros.storage.recording_files import no_recordings, recordings
+    from rebt_ros.storage.recording_files import no_recordings
+    from rebt_ros.storage.recording_files import recordings as recordings_in
 
     twice = set(request.binary_features) & set(request.categorical_features)
     if twice:
@@ -162,11 +180,10 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
         **dict.fromkeys(request.categorical_features, FeatureKind.CATEGORICAL),
     }
     options = LearnOptions(**request.options)
-    paths = recordings(Path(request.demonstrations))
-    reads = []
-    for place, path in enumerate(paths):
-        tell(Progress("reading", _READING * place / len(paths)))
-        reads.append(read_recording(path))
+    reads = (recordings or KeptRecordings(_read)).read(
+        recordings_in(Path(request.demonstrations)),
+        lambda share: tell(Progress("reading", _READING * share)),
+    )
     robot = next((read.robot for read in reads if read.robot is not None), None)
     tables = [
         replace(table, robot=robot)
@@ -203,6 +220,12 @@ def learn(request: Request, tell: Tell = lambda progress: None) -> Learned:
         _agreement_of(request.published, learnings),
     )
     return Learned(lesson, result, request.demonstrations, options)
+
+
+def _read(path: Path) -> Read:
+    from rebt_ros.storage.recording import read_recording
+
+    return read_recording(path)
 
 
 def _ruled(
