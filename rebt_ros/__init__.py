@@ -41,13 +41,14 @@ if TYPE_CHECKING:
     from rebt_ros.demonstration.schema import Feature, FeatureKind
     from rebt_ros.errors import DocumentError, InputError, OptionError, RebtError
     from rebt_ros.export.btcpp import to_btcpp
+    from rebt_ros.export.py_trees_xml import to_py_trees_xml
     from rebt_ros.learning.learning import Learning
     from rebt_ros.learning.learning_file import load_learning
     from rebt_ros.learning.named_states import State
     from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
     from rebt_ros.learning.policy import Decision, Policy
     from rebt_ros.learning.progress import Progress
-    from rebt_ros.learning.py_trees_form import to_py_trees
+    from rebt_ros.learning.py_trees_form import py_trees_nodes, to_py_trees
     from rebt_ros.learning.replaying import Disagreement, Replay
     from rebt_ros.logic.conditions import (
         Difference,
@@ -124,9 +125,11 @@ __all__ = [
     "Use",
     "learn",
     "load_learning",
+    "py_trees_nodes",
     "replay",
     "to_btcpp",
     "to_py_trees",
+    "to_py_trees_xml",
 ]
 
 _HOMES = {
@@ -187,9 +190,11 @@ _HOMES = {
     "Use": "rebt_ros.learning.options",
     "learn": "rebt_ros.offline.learning_from_files",
     "load_learning": "rebt_ros.learning.learning_file",
+    "py_trees_nodes": "rebt_ros.learning.py_trees_form",
     "replay": "rebt_ros.offline.replay_over_files",
     "to_btcpp": "rebt_ros.export.btcpp",
     "to_py_trees": "rebt_ros.learning.py_trees_form",
+    "to_py_trees_xml": "rebt_ros.export.py_trees_xml",
 }
 
 

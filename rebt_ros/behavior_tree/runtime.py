@@ -196,6 +196,10 @@ class TreeRuntime:
         """The status names of the nodes that the last `tick` ticked, by places in `nodes.walk`."""
         return {place: status.name for place, status in self._visited if place is not None}
 
+    def behaviour(self, place: int) -> py_trees.behaviour.Behaviour:
+        """What does the node at a place in `nodes.walk` of the tree that is run."""
+        return self._behaviours[place]
+
     def halt(self) -> None:
         """Interrupts whatever runs; the next tick starts afresh, with the same histories."""
         self.root.stop(Status.INVALID)

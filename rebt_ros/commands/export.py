@@ -1,4 +1,4 @@
-"""Writes a learned tree in the language of another engine: BehaviorTree.CPP 4, for Groot2 too."""
+"""Writes a learned tree for another engine: BehaviorTree.CPP 4, for Groot2 too, or py_trees."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ def main(arguments: list[str] | None = None) -> None:
         "--to",
         choices=list(LANGUAGES),
         default="btcpp",
-        help="btcpp: XML of BehaviorTree.CPP 4 (default: %(default)s)",
+        help="btcpp: XML of BehaviorTree.CPP 4; py_trees: XML of py_trees 2.5 and newer "
+        "(default: %(default)s)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help="write it to this file instead of printing it"

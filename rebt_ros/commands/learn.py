@@ -101,7 +101,8 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
         "--export",
         choices=list(LANGUAGES),
         help="also write the tree in the language of another engine; btcpp: XML of "
-        "BehaviorTree.CPP 4, to DIR/btcpp.xml",
+        "BehaviorTree.CPP 4, to DIR/btcpp.xml; py_trees: XML of py_trees 2.5 and newer, to "
+        "DIR/py_trees.xml",
     )
     parser.add_argument(
         "--rules",
