@@ -1,4 +1,4 @@
-"""Programs that watch the executor: Groot2's monitor, as btview asks for it, and its logs."""
+"""Programs that watch the executor: Groot2's monitor, as btview asks for it, logs, and topics."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import pytest
 pytest.importorskip("rclpy")
 
 from executor_examples import GO, STOP, TURN, Robot, learned, publish, status, where_x_is_small
-from ros_processes import NodeProcess, Peer, values_of
+from ros_processes import LATCHED, NodeProcess, Peer, values_of
+from std_msgs.msg import String
 
 from rebt_ros.storage.btlog import read_btlog
 
@@ -40,9 +41,15 @@ def test_btview_sees_what_the_executor_does_follows_a_swap_and_each_tree_has_a_l
 ) -> None:
     btview = pytest.importorskip("btview.client")
     port = _free_port()
-    parameters = {"enabled": True, "groot2_port": port, "btlog_directory": str(tmp_path / "logs")}
+    parameters = {
+        "enabled": True,
+        "groot2_port": port,
+        "btlog_directory": str(tmp_path / "logs"),
+        "status_topics": True,
+    }
     with NodeProcess("executor_node", domain, tmp_path, parameters) as executor:
         client = btview.Groot2Client(port=port, timeout_ms=20_000)
+        trees = peer.listen(String, "/executor/tree_xml", LATCHED)
         publish(peer, learned(where_x_is_small(GO, TURN)))
         robot = Robot(peer)
         robot.obeys("go")
@@ -52,6 +59,7 @@ def test_btview_sees_what_the_executor_does_follows_a_swap_and_each_tree_has_a_l
         assert board == {"x": 0.0}
         robot.state = (7.0, 1.0)
         robot.until(lambda: _by_name(client).get("turn") == "SUCCESS", "the status of turn")
+        robot.until(lambda: trees, "the XML of the first tree")
         first = client.tree_uuid
         publish(peer, learned(where_x_is_small(STOP, GO)))
         robot.until(lambda: _by_name(client).get("go") == "SUCCESS", "the new tree")
@@ -61,6 +69,9 @@ def test_btview_sees_what_the_executor_does_follows_a_swap_and_each_tree_has_a_l
         said = values_of(status(peer, "disabled", groot2=f"127.0.0.1:{port}"))
         assert said["bad groot2 requests"] == "0"
         client.close()
+        peer.wait_until(lambda: len(trees) == 2, what="the XML of both trees")
+        assert ['name="turn"' in one.data for one in trees] == [True, False]
+        assert said["statuses on"] in ("none: install nav2_msgs", "/executor/behavior_tree_log")
         assert executor.stop() == 0
         assert "Traceback" not in executor.stderr
     logs = sorted(map(read_btlog, (tmp_path / "logs").iterdir()), key=lambda log: log.began)

@@ -54,7 +54,7 @@ class ExecutorNode(Node):
         super().__init__("executor")
         self._settings = settings = declare_settings(self)
         faults = Faults(self.get_logger())
-        self._watching = Watching(settings.watching)
+        self._watching = Watching(self, settings.watching)
         commands = (
             RobotCommands(
                 self, settings.robot, lambda text: faults.note("failed command", f"{text}.")

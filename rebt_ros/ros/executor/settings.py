@@ -42,11 +42,13 @@ class WatchingSettings:
     """Where Groot2's monitor is answered on this machine; 0 for nowhere."""
     btlog_directory: Path | None
     """Where a log of each tree is written; None for nowhere."""
+    topics: bool
+    """Whether the tree's XML and the statuses of its nodes are published."""
 
     @property
     def watched(self) -> bool:
         """Whether there is anyone."""
-        return bool(self.groot2_port) or self.btlog_directory is not None
+        return bool(self.groot2_port) or self.btlog_directory is not None or self.topics
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,4 +221,12 @@ def _watching(declare: Parameters) -> WatchingSettings:
         "",
         "Directory for a .btlog of each tree that runs, to be replayed in Groot2; empty for none.",
     )()
-    return WatchingSettings(port, at_home("btlog_directory", directory) if directory else None)
+    topics = declare.flag(
+        "status_topics",
+        False,
+        "Whether the tree is published as XML on ~/tree_xml, and the statuses of its nodes on "
+        "~/behavior_tree_log where nav2_msgs is installed, as for Foxglove.",
+    )()
+    return WatchingSettings(
+        port, at_home("btlog_directory", directory) if directory else None, topics
+    )
