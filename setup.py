@@ -75,6 +75,7 @@ setup(
     package_data={
         PACKAGE: ["py.typed"],
         f"{PACKAGE}.behavior_tree": ["*.schema.json"],
+        f"{PACKAGE}.inspection": ["*.schema.json"],
         f"{PACKAGE}.robot_file": ["*.schema.json"],
         f"{PACKAGE}.studio": ["page/*"],
         f"{PACKAGE}.verification": ["*.schema.json"],
@@ -129,6 +130,7 @@ setup(
             f"export = {PACKAGE}.commands.export:main",
             f"explain = {PACKAGE}.commands.explain:main",
             f"generate = {PACKAGE}.commands.generate:main",
+            f"inspect = {PACKAGE}.commands.inspect:main",
             f"learn = {PACKAGE}.commands.learn:main",
             f"replay = {PACKAGE}.commands.replay:main",
             f"revise = {PACKAGE}.commands.revise:main",

@@ -30,7 +30,7 @@ LAYERS: Final = (
     {"studio"},
     {PACKAGE},  # rebt_ros/__init__.py, the public interface
     {"offline", "study", "options", "simulation"},
-    {"learning", "trial"},
+    {"inspection", "learning", "trial"},
     {"storage", "simulated_robot", "drawing", "beyond_the_paper", "export", "verification"},
     {"paper"},
     {"decision_tree"},

@@ -14,6 +14,7 @@ from rebt_ros.behavior_tree import document
 from rebt_ros.behavior_tree.shown import MOST_SHOWN_LEAVES
 from rebt_ros.beyond_the_paper import reductions
 from rebt_ros.decision_tree import simplest
+from rebt_ros.inspection import contradictions, duplicates, idle, outliers, timing
 from rebt_ros.learning import suggesting
 from rebt_ros.robot_file.reading import json_schema
 
@@ -71,6 +72,29 @@ def test_the_page_on_learning_names_the_limits() -> None:
         assert f" {limit} leaves" in page
     assert suggesting._MOST_SUGGESTIONS == 12
     assert "at most twelve suggestions" in page
+
+
+def test_the_page_on_inspecting_names_the_thresholds() -> None:
+    page = text_of("inspect.md")
+    for said in (
+        f"by more than {timing.FENCE:g} times the range between the quartiles, and than "
+        f"{timing.MANY_TIMES:g} times their median; told from {timing.FEWEST_INTERVALS} times on",
+        f"at least {idle.IDLE_SECONDS:g} s (`--idle SECONDS`) and {idle.IDLE_ROWS} rows in which",
+        f"varies by more than {idle.STILL * 100:g} % of its",
+        f"of at least {duplicates.FEWEST_ROWS} rows that is as long as an earlier one "
+        f"(to {duplicates.LENGTH * 100:g} %",
+        f"alike in {duplicates.MOST_ROWS * 100:g} % of the rows",
+        f"differs by more than {duplicates.ALIKE * 100:g} % of its",
+        f"among more than {duplicates.MOST_DEMONSTRATIONS:,} demonstrations",
+        f"of at least {outliers.FEWEST} demonstrations",
+        f"modified z-score above {outliers.SCORE:g}",
+        f"by a factor of {outliers.FACTOR:g}, by {outliers.SHARE:g}, or by half",
+        f"by at least {outliers.OUTSIDE * 100:g} % of its usual range",
+        f"{timing.MOST_LISTED} gaps, idle stretches and contradicting rows",
+        f"{outliers.MOST_LISTED} outliers",
+    ):
+        assert said.casefold() in page.casefold()
+    assert (outliers.RANGE, contradictions.MOST_LISTED) == (0.5, timing.MOST_LISTED)
 
 
 def test_no_page_has_what_a_conflict_leaves() -> None:

@@ -109,12 +109,21 @@ def use_color() -> bool:
     return sys.stdout.isatty() and "NO_COLOR" not in os.environ
 
 
-def aligned(cells: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Lines of a table: the first column to the left, the others to the right."""
+def aligned(cells: Sequence[Sequence[str]], words: int = 0) -> Iterator[str]:
+    """Lines of a table: the first column to the left, the others to the right.
+
+    Args:
+        cells: The lines.
+        words: How many columns at the right are text, which stands to the left.
+    """
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    for first, *others in cells:
-        right = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
-        yield "  ".join((f"{first:<{widths[0]}}", *right)).rstrip()
+    numbers = range(1, len(widths) - words)
+    for line in cells:
+        sides = (">" if place in numbers else "<" for place in range(len(line)))
+        placed = (
+            f"{cell:{side}{width}}" for cell, side, width in zip(line, sides, widths, strict=True)
+        )
+        yield "  ".join(placed).rstrip()
 
 
 def add_seed(parser: argparse.ArgumentParser) -> None:

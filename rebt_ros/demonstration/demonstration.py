@@ -16,6 +16,9 @@ from rebt_ros.demonstration.schema import Feature
 #: Channel of actions that came without a topic, as in a CSV table.
 DEFAULT_CHANNEL = "action"
 
+#: Stamps closer to each other than that are numbers of rows (nanoseconds).
+NO_TIME = 1_000
+
 
 class RowKind(Enum):
     """What a row stands for, and so what was done "before" it."""

@@ -7,12 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from rebt_ros.arrays import IntArray
+from rebt_ros.demonstration.demonstration import NO_TIME
 from rebt_ros.demonstration.last_action import NO_ACTION, previous_actions
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
-
-#: Stamps closer to each other than that are numbers of rows (nanoseconds).
-_NO_TIME = 1_000
 
 
 def shifted(table: DemonstrationTable, rows: int) -> DemonstrationTable:
@@ -83,4 +81,4 @@ def row_gap(table: DemonstrationTable) -> float | None:
     """Seconds from a row to the next; None where stamps tell no time."""
     gaps = np.diff(table.stamps)[np.diff(table.demonstration) == 0]
     gap = float(np.median(gaps)) if len(gaps) else 0.0
-    return gap / 1e9 if gap > _NO_TIME else None
+    return gap / 1e9 if gap > NO_TIME else None

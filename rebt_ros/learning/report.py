@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rebt_ros.arrays import IntArray
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.demonstration.equal_states import codes_of_states
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning.judged_levels import JudgedLevels
@@ -29,9 +29,6 @@ FORECAST = "a weak one: rank correlation with success 0.2 to 0.6 within a task"
 
 #: So many actions are listed in a sentence.
 _LISTED = 12
-
-#: Odd numbers that stir hashes of states.
-_GOLDEN, _ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD6E8FEB86659FD93)
 
 #: Conflicts that are mentioned: the share of the rows from which on they matter.
 _MENTIONED = 0.001
@@ -157,7 +154,7 @@ def report_on(
         mean_recall, agreement = float(levels.mean_recalls[level]), float(levels.means[level])
         recalls = [None if np.isnan(one) else one for one in levels.recalls[level].tolist()]
     taken = {action.label for action in nodes.actions(tree)}
-    states = _codes_of_states(table)
+    states = codes_of_states(table.states)
     conflicts = after_history = _conflicts(states, table.chosen)
     if history is History.PREVIOUS:
         before = states * (len(table.actions) + 1) + table.previous + 1
@@ -175,25 +172,6 @@ def report_on(
         after_history,
         len(table),
     )
-
-
-def _codes_of_states(table: DemonstrationTable) -> IntArray:
-    """A number for each row, equal for equal states, shape (rows,)."""
-    hashes = np.zeros(len(table), dtype=np.uint64)
-    # Column by column, so that a large table is not held a second time.
-    for column in table.states.T:
-        # 0 has two signs, and NaN many forms.
-        values = np.where(np.isnan(column), np.nan, column) + 0.0
-        hashes = _mixed(hashes + _GOLDEN) ^ _mixed(values.view(np.uint64))
-        hashes *= _ODD
-    return np.unique(hashes, return_inverse=True)[1].astype(np.int64)
-
-
-def _mixed(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
-    """Spreads each bit over all 64 (the finalizer of splitmix64, Steele et al., 2014)."""
-    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return bits ^ (bits >> np.uint64(31))
 
 
 def _conflicts(situations: IntArray, chosen: IntArray) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording import read_recording
 from rebt_ros.storage.recording_files import SUFFIX, is_recording
 from rebt_ros.storage.robot_bag import read_robot_bag
-from rebt_ros.storage.sources import Strange, passed_over, sources_of
+from rebt_ros.storage.sources import Strange, names_of, passed_over, sources_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,15 +27,18 @@ class Loaded:
     """What was read from all inputs."""
 
     demonstrations: tuple[Demonstration, ...]
+    """Their names differ: they are those of their files, or their paths where several files have
+    one name."""
     notes: tuple[str, ...]
-    """What a person should know, each led by the name of its demonstration, or by its path where
-    others have the same name."""
+    """What a person should know, each led by the name of its demonstration."""
     accounts: Mapping[str, Account] = field(default_factory=dict)
     """Where what each demonstration's file holds went, by the same names."""
     robot: RobotFile | None = None
     """Where features and actions are in messages, as the first file has it that says so."""
     aside: tuple[Aside, ...] = ()
     """What could not be read, in the order of the inputs."""
+    paths: tuple[Path, ...] = ()
+    """Of the demonstrations."""
 
 
 def as_paths(inputs: Sequence[str | Path] | str | Path) -> tuple[Path, ...]:
@@ -83,30 +85,35 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         if isinstance(answer, RebtError)
     }
     aside = _aside([one.path for one in sources if one.path in errors], errors, len(sources))
+    names = dict(zip((one.path for one in sources), names_of(sources), strict=True))
     there = [
-        (source.path, answer)
+        (source.path, _named(answer, names[source.path]))
         for source, answer in zip(readable, gathered.found, strict=True)
         if isinstance(answer, Read)
     ]
     if aside:
         options.plan.tell(aside)
     reads = _with_common_features([read for _, read in there])
-    names = _names([path for path, _ in there], reads)
     return Loaded(
         tuple(read.demonstration for read in reads),
         (
             *_notes_on_cache(gathered, options),
             *passed_over(inputs, {one.path for one in sources}),
             *(
-                f"{name}: {note}"
-                for name, read in zip(names, reads, strict=True)
+                f"{read.demonstration.name}: {note}"
+                for read in reads
                 for note in (*read.notes, *(read.account.notes() if read.account else ()))
             ),
         ),
-        {name: read.account for name, read in zip(names, reads, strict=True) if read.account},
+        {read.demonstration.name: read.account for read in reads if read.account},
         next((read.robot for read in reads if read.robot is not None), None),
         aside,
+        tuple(path for path, _ in there),
     )
+
+
+def _named(read: Read, name: str) -> Read:
+    return replace(read, demonstration=replace(read.demonstration, name=name))
 
 
 def _gathered(sources: Sequence[Source], options: InputOptions) -> Gathered:
@@ -161,15 +168,6 @@ def _notes_on_cache(gathered: Gathered, options: InputOptions) -> Iterator[str]:
             "read anew the next time, unless --cache names a directory with room where you may "
             "write"
         )
-
-
-def _names(paths: Sequence[Path], reads: Sequence[Read]) -> list[str]:
-    """What inputs are called in notes: by their paths where demonstrations share a name."""
-    counts = Counter(read.demonstration.name for read in reads)
-    return [
-        read.demonstration.name if counts[read.demonstration.name] == 1 else str(path)
-        for path, read in zip(paths, reads, strict=True)
-    ]
 
 
 def _with_common_features(reads: Sequence[Read]) -> list[Read]:

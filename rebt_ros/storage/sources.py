@@ -7,6 +7,7 @@ A directory stands for what is in it, a pattern such as `fleet/*/run_?` for what
 from __future__ import annotations
 
 import glob
+from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,6 +77,20 @@ def sources_of(inputs: Sequence[Path], *, strict: bool = True) -> list[Source | 
     return found
 
 
+def names_of(sources: Sequence[Source | Strange]) -> tuple[str, ...]:
+    """What demonstrations are called: by their files, by paths where several files have one name.
+
+    >>> names_of([Source(Path("a/run.csv"), InputKind.TABLE), Source(Path("b"), InputKind.BAG)])
+    ('run.csv', 'b')
+    """
+    names = [source.path.absolute().name for source in sources]
+    counts = Counter(names)
+    return tuple(
+        name if counts[name] == 1 else str(source.path)
+        for name, source in zip(names, sources, strict=True)
+    )
+
+
 def passed_over(inputs: Sequence[Path], taken: Set[Path]) -> Iterator[str]:
     """Notes what in directories looks like demonstrations and is not among those taken."""
     for path in _expanded(inputs):
@@ -139,28 +154,41 @@ def _expanded(inputs: Sequence[Path]) -> Iterator[Path]:
 
 def _listed(file: Path) -> Iterator[Path]:
     """What the lines of a list stand for, one of which is what it would be as an input."""
+    for line in listed(file, "inputs"):
+        if line.startswith(_LIST) and not Path(line).exists():
+            raise InputError(f"{file} lists the list {line}: name it as an input of its own.")
+        yield from _matching(Path(line))
+
+
+def listed(file: Path, what: str) -> tuple[str, ...]:
+    """The lines of a list that say something; at least one.
+
+    Args:
+        file: The list.
+        what: Of what it is one, in the plural.
+
+    Raises:
+        InputError: It cannot be read, or is no list.
+    """
     try:
         if file.is_file() and file.stat().st_size > _LONGEST_LIST:
-            raise InputError(f"{file} is too long for a list of inputs: name a shorter one.")
+            raise InputError(f"{file} is too long for a list of {what}: name a shorter one.")
         lines = file.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as err:
-        raise _no_list(file) from err
+        raise _no_list(file, what) from err
     except OSError as err:
         raise unreadable(file, err) from err
     named = [line.strip() for line in lines]
     named = [line for line in named if line and not line.startswith(_COMMENT)]
     if not named:
-        raise InputError(f"{file} lists no inputs: write a path in each of its lines.")
-    for line in named:
-        if line.startswith(_LIST) and not Path(line).exists():
-            raise InputError(f"{file} lists the list {line}: name it as an input of its own.")
-        if "\0" in line:
-            raise _no_list(file)
-        yield from _matching(Path(line))
+        raise InputError(f"{file} lists no {what}: write one in each of its lines.")
+    if any("\0" in line for line in named):
+        raise _no_list(file, what)
+    return tuple(named)
 
 
-def _no_list(file: Path) -> InputError:
-    return InputError(f"{file} is no list of inputs: write a path in each of its lines.")
+def _no_list(file: Path, what: str) -> InputError:
+    return InputError(f"{file} is no list of {what}: write one in each of its lines.")
 
 
 def _matching(path: Path) -> Iterator[Path]:

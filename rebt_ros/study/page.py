@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
-from html import escape
 
+from rebt_ros.drawing.html import page, paragraph, table
 from rebt_ros.study.bars import BarChart, bar_chart_svg, histogram
 from rebt_ros.study.figures import Difference, Loss, differences, reductions
 from rebt_ros.study.mode import Mode
@@ -15,27 +14,6 @@ from rebt_ros.study.report import ExperimentReport, rows_of_table
 
 #: Width of a group in the plot of reductions, in per cent.
 _REDUCTION_STEP = 5
-#: What no text of a page may contain.
-_CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
-
-_STYLE = """
-:root { color-scheme: light dark; --ground: #ffffff; --ink: #16283a; --faded: #51606f;
-  --grid: #dfe5eb; --series-1: #1f6fb4; --series-2: #e08a2c; }
-@media (prefers-color-scheme: dark) { :root { --ground: #12181f; --ink: #e6edf3; --faded: #9fb0c0;
-  --grid: #2b3743; --series-1: #5aa9e6; --series-2: #f0a958; } }
-body { font: 15px/1.5 system-ui, 'Segoe UI', Roboto, Helvetica, Arial, sans-serif;
-  background: var(--ground); color: var(--ink); max-width: 72rem; margin: 0 auto;
-  padding: 1.5rem; }
-h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2.2rem; }
-p, li { max-width: 46rem; } .faded { color: var(--faded); }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.3rem 0.8rem; border-bottom: 1px solid var(--grid); text-align: right;
-  vertical-align: top; }
-th:first-child, td:first-child, td.words { text-align: left; }
-td.words { font-size: 0.85rem; min-width: 18rem; overflow-wrap: anywhere; }
-svg { width: 100%; max-width: 760px; height: auto; display: block; margin: 0.8rem 0; }
-"""
 
 
 def report_page(report: ExperimentReport) -> str:
@@ -43,25 +21,20 @@ def report_page(report: ExperimentReport) -> str:
     body = "\n".join(
         [*_summary(report), *_plots(report), *_losses(report), *_lost(report), *_method(report)]
     )
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        "<title>RE:BT-Espresso: experiment</title>\n"
-        f"<style>{_STYLE}</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n"
-    )
+    return page("RE:BT-Espresso: experiment", body)
 
 
 def _summary(report: ExperimentReport) -> Iterator[str]:
     rows = sum(result.rows for result in report.results)
     levels = sum(result.levels for result in report.results)
     yield "<h1>RE:BT-Espresso: simulated trees, learned back</h1>"
-    yield _paragraph(
+    yield paragraph(
         f"{len(report.results)} of {len(report.results) + len(report.lost)} configurations, "
         f"{report.settings.ticks} ticks each, seed {report.settings.seed}: {rows} rows, "
         f"{levels} pruning levels, {report.measured.compared} pairs of subtrees compared."
     )
-    yield _table(rows_of_table(report))
-    yield _paragraph(
+    yield table(rows_of_table(report))
+    yield paragraph(
         "Distances are graph edit distances: an upper bound, the same measure for all modes. A win "
         "is a simulated subtree to which the mode comes nearer than BT-Espresso (baseline). A "
         "minimum over many subtrees flatters, so compare figures with what was offered per level.",
@@ -76,7 +49,7 @@ def _plots(report: ExperimentReport) -> Iterator[str]:
         apart = differences(report.results, mode)
         yield bar_chart_svg(_difference_chart(mode, apart))
         zeros = [sum(not value for value in values) for _, values in _statistics(apart)]
-        yield _paragraph(
+        yield paragraph(
             f"Right of 0 {mode.value} mode is nearer. Differences of zero are left out: "
             f"{zeros[0]} of the minimum, {zeros[1]} of the median.",
             faded=True,
@@ -96,7 +69,7 @@ def _plots(report: ExperimentReport) -> Iterator[str]:
     unchanged = " and ".join(
         f"{sum(not value for value in values)} in {mode.value} mode" for mode, values in saved
     )
-    yield _paragraph(f"Trees without a difference are left out: {unchanged}.", faded=True)
+    yield paragraph(f"Trees without a difference are left out: {unchanged}.", faded=True)
 
 
 def _difference_chart(mode: Mode, apart: Sequence[Difference]) -> BarChart:
@@ -122,10 +95,10 @@ def _losses(report: ExperimentReport) -> Iterator[str]:
     yield "<h2>Losses</h2>"
     listed = [(mode, loss) for mode, figures in report.figures.items() for loss in figures.losses]
     if not listed:
-        yield _paragraph("There are none: nowhere does BT-Espresso come nearer.")
+        yield paragraph("There are none: nowhere does BT-Espresso come nearer.")
         return
     heading = ("mode", "configuration", "subtree", "of", "distance", "BT-Espresso's", *_WORDS)
-    yield _table([heading, *(_loss_row(mode, loss) for mode, loss in listed)], words=3)
+    yield table([heading, *(_loss_row(mode, loss) for mode, loss in listed)], words=3)
 
 
 _WORDS = ("simulated", "found", "found by BT-Espresso")
@@ -148,9 +121,9 @@ def _loss_row(mode: Mode, loss: Loss) -> tuple[str, ...]:
 def _lost(report: ExperimentReport) -> Iterator[str]:
     yield "<h2>Lost configurations</h2>"
     if not report.lost:
-        yield _paragraph("There are none.")
+        yield paragraph("There are none.")
         return
-    yield _table(
+    yield table(
         [("configuration", "reason"), *((one.configuration, one.reason) for one in report.lost)],
         words=1,
     )
@@ -159,7 +132,7 @@ def _lost(report: ExperimentReport) -> Iterator[str]:
 def _method(report: ExperimentReport) -> Iterator[str]:
     found = report.measured
     yield "<h2>Measure, settings, versions</h2>"
-    yield _paragraph(
+    yield paragraph(
         f"{found.measured} different pairs were measured; {found.excluded} of the "
         f"{found.compared} pairs compared were excluded by their labels alone. "
         f"{found.exact_minima.count} of {found.exact_minima.total} minima, and "
@@ -168,7 +141,7 @@ def _method(report: ExperimentReport) -> Iterator[str]:
     )
     if found.networkx_tried:
         finished = found.at_most_networkx
-        yield _paragraph(
+        yield paragraph(
             f"networkx's heuristic, the paper's measure, was tried on {found.networkx_tried} pairs "
             f"drawn at random and took longer than {report.settings.pair_seconds:g} s for "
             f"{found.networkx_missed}. Of the other {finished.total}, {finished.count} are at most "
@@ -176,39 +149,4 @@ def _method(report: ExperimentReport) -> Iterator[str]:
         )
     known = provenance(report.settings)
     rows = [(name, str(value)) for part in known.values() for name, value in part.items()]
-    yield _table([("setting or package", "value"), *rows])
-
-
-def _table(rows: Sequence[Sequence[str]], words: int = 0) -> str:
-    """A table.
-
-    Args:
-        rows: The heading and the lines.
-        words: How many columns at the right are running text.
-    """
-    heading, *lines = rows
-    numbers = len(heading) - words
-    head = "".join(f'<th scope="col">{_text(cell)}</th>' for cell in heading)
-    body = "\n".join(
-        "<tr>"
-        + "".join(
-            f'<td class="words">{_text(cell)}</td>'
-            if place >= numbers
-            else f"<td>{_text(cell)}</td>"
-            for place, cell in enumerate(line)
-        )
-        + "</tr>"
-        for line in lines
-    )
-    return (
-        f'<div class="wide"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>'
-        "\n</table></div>"
-    )
-
-
-def _paragraph(text: str, *, faded: bool = False) -> str:
-    return f'<p class="faded">{_text(text)}</p>' if faded else f"<p>{_text(text)}</p>"
-
-
-def _text(text: str) -> str:
-    return escape(_CONTROLS.sub("", text))
+    yield table([("setting or package", "value"), *rows])

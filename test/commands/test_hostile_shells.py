@@ -22,6 +22,7 @@ COMMANDS = (
     "explain",
     "export",
     "generate",
+    "inspect",
     "learn",
     "replay",
     "revise",

@@ -251,7 +251,9 @@ def test_patterns_and_lists_stand_for_what_they_match_and_list(
         return [one.name for one in load([Path(one) for one in given]).demonstrations]
 
     assert names("fleet/run_[02]") == ["run_0", "run_2"]
-    assert names("**/run_[45]/*.mcap") == ["run_0.mcap", "run_0.mcap"]
+    # Two files with one name are told apart by their paths.
+    twice = [f"fleet/run_{number}/run_0.mcap" for number in (4, 5)]
+    assert names("**/run_[45]/*.mcap") == twice
     Path("list.txt").write_text("# good ones\n\n fleet/run_5 \nfleet/run_[01]\n")
     assert names("@list.txt", "fleet/run_4") == ["run_5", "run_0", "run_1", "run_4"]
     Path("@odd").mkdir()

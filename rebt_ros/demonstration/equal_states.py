@@ -1,0 +1,36 @@
+"""Which rows have equal states."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from rebt_ros.arrays import FloatArray, IntArray
+
+#: Odd numbers that stir hashes of states.
+_GOLDEN, _ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD6E8FEB86659FD93)
+
+
+def codes_of_states(states: FloatArray) -> IntArray:
+    """A number for each row, equal for equal states, shape (rows,).
+
+    What is missing equals what is missing.
+
+    Args:
+        states: Shape (rows, features).
+    """
+    hashes = np.zeros(len(states), dtype=np.uint64)
+    # Column by column, so that a large table is not held a second time.
+    for column in states.T:
+        # 0 has two signs, and NaN many forms.
+        values = np.where(np.isnan(column), np.nan, column) + 0.0
+        hashes = _mixed(hashes + _GOLDEN) ^ _mixed(values.view(np.uint64))
+        hashes *= _ODD
+    return np.unique(hashes, return_inverse=True)[1].astype(np.int64)
+
+
+def _mixed(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
+    """Spreads each bit over all 64 (the finalizer of splitmix64, Steele et al., 2014)."""
+    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return bits ^ (bits >> np.uint64(31))

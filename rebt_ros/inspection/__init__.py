@@ -1,0 +1,1 @@
+"""What demonstrations hold, looked at before anything is learned from them."""
