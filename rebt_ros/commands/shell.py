@@ -205,6 +205,14 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
 def _add_plan(parser: argparse.ArgumentParser) -> None:
     """Adds by which means inputs are read."""
     many = parser.add_argument_group("many inputs (docs/scale.md)")
+    many.add_argument(
+        "--exclude",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="leave out demonstrations: what inspect calls one, a path, a pattern such as "
+        "'run_?.csv', or @FILE with such a line for each; repeatable",
+    )
     cache = many.add_mutually_exclusive_group()
     cache.add_argument(
         "--cache",
@@ -254,6 +262,7 @@ def input_options(
         sample_rate=arguments.sample_rate,
         skip_bad=arguments.skip_bad,
         robot=_robot_file(arguments.robot) if arguments.robot else None,
+        exclude=tuple(arguments.exclude),
         plan=ReadingPlan(
             cache=None if arguments.no_cache else arguments.cache or default_cache(),
             jobs=arguments.jobs,

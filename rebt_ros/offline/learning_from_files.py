@@ -112,7 +112,15 @@ def learn(
         kept = _ruled(learned, asked, loaded.demonstrations, repair)
         learned, proven = kept.learned, kept.rules
     notes = (*loaded.notes, *further, *_not_on_a_robot(learned))
-    result = OfflineLearning(learned, learnings, notes, loaded.accounts, proven, aside=loaded.aside)
+    result = OfflineLearning(
+        learned,
+        learnings,
+        notes,
+        loaded.accounts,
+        proven,
+        aside=loaded.aside,
+        excluded=loaded.excluded,
+    )
     if out is not None:
         writing = _part(progress, _LEARNING_SHARE, 1.0)
         most = most_levels if levels else 0

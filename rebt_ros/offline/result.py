@@ -40,6 +40,8 @@ class OfflineLearning:
     """The rules that the tree was proven to keep, each in a line."""
     aside: tuple[Aside, ...] = ()
     """Inputs that could not be read, and were left out."""
+    excluded: tuple[Path, ...] = ()
+    """Inputs that were left out as asked."""
 
 
 def write_summary(
@@ -50,6 +52,7 @@ def write_summary(
         "inputs": list(inputs),
         "accounts": {name: account.as_json() for name, account in result.accounts.items()},
         "set_aside": [{"path": str(aside.path), "reason": aside.reason} for aside in result.aside],
+        "excluded": [str(path) for path in result.excluded],
         "notes": list(result.notes),
         "random_state": options.random_state,
         "upsample": options.upsample.value,

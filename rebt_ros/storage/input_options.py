@@ -90,6 +90,9 @@ class InputOptions:
     """Of bags: whether messages that cannot be used are left out, instead of the bag refused."""
     robot: RobotFile | None = None
     """Of bags, where features and actions are in messages of any type, instead of topics."""
+    exclude: tuple[str, ...] = ()
+    """Demonstrations that are left out, before they are read: names of files, paths, patterns, and
+    `@list.txt` with such in its lines."""
     plan: ReadingPlan = field(default_factory=ReadingPlan)
     """By which means they are read."""
 
@@ -99,7 +102,7 @@ class InputOptions:
         Raises:
             OptionError: A value is of another type.
         """
-        for name in ("labels", "channels", "action_topics"):
+        for name in ("labels", "channels", "action_topics", "exclude"):
             object.__setattr__(self, name, _texts(name, getattr(self, name)))
         topics = self.state_topics
         several = (topics,) if isinstance(topics, str | StateTopic) else topics

@@ -10,6 +10,7 @@ from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.errors import InputError, OptionError, RebtError
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.account import Account
+from rebt_ros.storage.addressing import excluded
 from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.column_names import FEWEST_RISING
 from rebt_ros.storage.csv_table import read_csv
@@ -20,6 +21,9 @@ from rebt_ros.storage.recording import read_recording
 from rebt_ros.storage.recording_files import SUFFIX, is_recording
 from rebt_ros.storage.robot_bag import read_robot_bag
 from rebt_ros.storage.sources import Strange, names_of, passed_over, sources_of
+
+#: How many paths a note lists.
+_LISTED = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,8 @@ class Loaded:
     """What could not be read, in the order of the inputs."""
     paths: tuple[Path, ...] = ()
     """Of the demonstrations."""
+    excluded: tuple[Path, ...] = ()
+    """What was left out as asked, in the order of the inputs."""
 
 
 def as_paths(inputs: Sequence[str | Path] | str | Path) -> tuple[Path, ...]:
@@ -74,7 +80,8 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         WorkerError: What reads elsewhere does not work.
     """
     options = options or InputOptions()
-    sources = sources_of(inputs, strict=options.plan.strict)
+    every = sources_of(inputs, strict=options.plan.strict and not options.exclude)
+    sources, left_out = _without_excluded(every, options)
     readable = [one for one in sources if isinstance(one, Source)]
     _check_options(options, {source.kind for source in readable})
     strange = {one.path: one.error for one in sources if isinstance(one, Strange)}
@@ -97,8 +104,9 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     return Loaded(
         tuple(read.demonstration for read in reads),
         (
+            *_notes_on_excluded(left_out, len(every)),
             *_notes_on_cache(gathered, options),
-            *passed_over(inputs, {one.path for one in sources}),
+            *passed_over(inputs, {one.path for one in every}),
             *(
                 f"{read.demonstration.name}: {note}"
                 for read in reads
@@ -109,7 +117,28 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         next((read.robot for read in reads if read.robot is not None), None),
         aside,
         tuple(path for path, _ in there),
+        left_out,
     )
+
+
+def _without_excluded(
+    sources: Sequence[Source | Strange], options: InputOptions
+) -> tuple[list[Source | Strange], tuple[Path, ...]]:
+    """The inputs that are not left out, and the paths of those that are.
+
+    Raises:
+        InputError: What is left out is not there, or is all; or the plan is strict and another one
+            is nothing to read.
+    """
+    if not options.exclude:
+        return list(sources), ()
+    paths = [one.path for one in sources]
+    out = excluded(names_of(sources), paths, options.exclude)
+    kept = [one for place, one in enumerate(sources) if place not in out]
+    strange = next((one for one in kept if isinstance(one, Strange)), None)
+    if strange is not None and options.plan.strict:
+        raise strange.error
+    return kept, tuple(paths[place] for place in sorted(out))
 
 
 def _named(read: Read, name: str) -> Read:
@@ -159,6 +188,13 @@ def _aside(
             raise first
         raise InputError(f"none of {inputs} inputs can be read; the first: {first}") from first
     return tuple(Aside(path, str(errors[path])) for path in paths)
+
+
+def _notes_on_excluded(paths: Sequence[Path], inputs: int) -> Iterator[str]:
+    if paths:
+        more = ", ..." if len(paths) > _LISTED else ""
+        named = ", ".join(map(str, paths[:_LISTED]))
+        yield f"{len(paths)} of {inputs} demonstrations are left out as asked: {named}{more}"
 
 
 def _notes_on_cache(gathered: Gathered, options: InputOptions) -> Iterator[str]:
