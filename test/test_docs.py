@@ -58,7 +58,7 @@ def test_the_reference_of_robot_files_is_that_of_their_schema() -> None:
 
 
 def test_the_page_on_learning_names_the_limits() -> None:
-    page = text_of("learning.md")
+    page = " ".join(text_of("learning.md").split())
     rows, leaves, each = simplest._MOST_ROWS, simplest._MOST_LEAVES, simplest._LEAST_ROWS_PER_LEAF
     assert (
         f"trees of up to {leaves} leaves, with at least {each} rows for each, and at most {rows}"

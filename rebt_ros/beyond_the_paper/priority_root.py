@@ -1,4 +1,4 @@
-"""Past the paper: smaller trees with the same behavior.
+"""Beyond the paper: smaller trees with the same behavior.
 
 Infeasible combinations of conditions are don't-cares, factoring is repeated, the children of a
 Selector root stand in order of priority, and two thresholds are one interval.
