@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo studio test bench bench-driving bench-recorder bench-scale experiment fuzz soak lint format clean
+.PHONY: help setup build demo studio test test-lowest bench bench-driving bench-recorder bench-scale experiment fuzz soak lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -61,6 +61,14 @@ test: build ## Run the tests on the built package.
 	$(COLCON) test-result --test-result-base build/rebt_ros --verbose || status=$$?; \
 	$(VENV_PYTHON) .ci/count_tests.py build/rebt_ros/pytest.xml || status=$$?; \
 	exit $$status
+
+# On the checkout: what is installed from it does not depend on versions.
+test-lowest: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+test-lowest: export VENV := .venv-lowest
+test-lowest: export CONSTRAINTS ?= .ci/lowest.txt
+test-lowest: ## Run the tests with the lowest versions of all dependencies (ARGS="test/learning", CONSTRAINTS=.ci/jazzy.txt).
+	@.ci/setup.sh
+	@PYTHONPATH=.:$$PYTHONPATH $$VENV/bin/python -m pytest -q -n 2 --dist loadfile --max-worker-restart 0 $(ARGS)
 
 bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 bench: setup ## Measure us and the limit in turn, for docs/performance.md (ARGS="--only tick" for options).

@@ -66,7 +66,7 @@ def _env_that_blocks():
 
 setup(
     name=PACKAGE,
-    version="0.1.0",
+    version="0.2.0",
     description="Learns executable behavior trees from robot demonstrations (RE:BT-Espresso)",
     maintainer="rebt_ros maintainers",
     maintainer_email="maintainers@rebt-ros.org",
@@ -96,7 +96,8 @@ setup(
         "py_trees>=2.3",
         "pyeda>=0.29",
         "pyyaml>=6",
-        "rosbags>=0.11",
+        # Before that, rosbags brought another library for zstd than the one that we use as well.
+        "rosbags>=0.11.7",
         "scikit-learn>=1.4",
         "scipy>=1.11",
     ],

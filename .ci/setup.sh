@@ -6,6 +6,7 @@
 # --system-site-packages) and pip adds only what is missing.  Elsewhere ROS 2 Jazzy comes from PyPI.
 #
 # PYTHON=/path/to/python overrides the choice of the interpreter.
+# VENV names another directory, and CONSTRAINTS a file of versions for pip, as for make test-lowest.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -13,7 +14,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # those of .venv would not find their libraries.
 unset _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-venv=.venv
+venv=${VENV:-.venv}
+constraints=${CONSTRAINTS:-}
 stamp=$venv/.set-up
 ros_wheels=(ros-jazzy-rclpy ros-jazzy-common-interfaces ros-jazzy-rmw-fastrtps-cpp ros-jazzy-test-msgs)
 tools=(colcon-common-extensions mypy ruff setuptools)
@@ -71,7 +73,7 @@ else
     ros=wheels
 fi
 
-wanted=$(echo "ros=$ros ${ros_python:-} python=${PYTHON:-any}" && sha256sum setup.py .ci/setup.sh)
+wanted=$(echo "ros=$ros ${ros_python:-} python=${PYTHON:-any}" && sha256sum setup.py .ci/setup.sh $constraints)
 if $venv/bin/python -c '' 2>/dev/null && [[ -f $stamp && $(<$stamp) == "$wanted" ]]; then
     exit 0
 fi
@@ -97,7 +99,8 @@ rm -f $stamp
 
 pip_install() {
     # Quiet down to errors: pip's progress and warnings would bury what comes after.
-    $venv/bin/python -m pip install -qq --no-input --disable-pip-version-check "$@" ||
+    $venv/bin/python -m pip install -qq --no-input --disable-pip-version-check \
+        ${constraints:+-c "$constraints"} "$@" ||
         fail "pip could not install $*"
 }
 
@@ -110,10 +113,14 @@ else
 fi
 
 # The package itself is installed by colcon; only its dependencies go into the environment.
-mapfile -t dependencies < <($venv/bin/python -c '
-import setuptools, distutils.core
+# Where versions are given, two extras are left out: a cluster needs a newer joblib than the rest, and
+# the tasks of the driving benchmark are no part of the package.
+mapfile -t dependencies < <(CONSTRAINTS=$constraints $venv/bin/python -c '
+import os, setuptools, distutils.core
 package = distutils.core.run_setup("setup.py", stop_after="init")
-print(*package.install_requires, *sum(package.extras_require.values(), []), sep="\n")')
+left_out = {"cluster", "driving"} if os.environ["CONSTRAINTS"] else set()
+extras = [needs for extra, needs in package.extras_require.items() if extra not in left_out]
+print(*package.install_requires, *sum(extras, []), sep="\n")')
 [[ ${#dependencies[@]} -gt 0 ]] || fail "could not read the dependencies out of setup.py"
 if ! command -v cc >/dev/null && ! $venv/bin/python -c 'import pyeda' 2>/dev/null; then
     fail "pyeda is compiled when it is installed and needs a C compiler: install gcc"

@@ -97,6 +97,39 @@ def test_setup_py_declares_what_is_imported_from_pypi_and_no_ros() -> None:
     assert declared <= {name for _, name in DECLARED_AS.values()}
 
 
+def _bounds() -> dict[str, str]:
+    """The lower bound of every requirement in setup.py that has one, extras included."""
+    text = (CHECKOUT / "setup.py").read_text(encoding="utf-8")
+    found = re.findall(r'"([\w-]+)>=([\d.]+)"', text)
+    # The extra for clusters needs a newer joblib than the rest.
+    return dict(reversed(found))
+
+
+def _pins(file: str) -> dict[str, str]:
+    lines = (CHECKOUT / ".ci" / file).read_text(encoding="utf-8").splitlines()
+    return dict(line.split("==") for line in lines if not line.startswith("#"))
+
+
+def _release(version: str) -> list[int]:
+    return [int(number) for number in re.findall(r"\d+", version.partition(".post")[0])]
+
+
+def test_the_lowest_versions_that_are_tested_are_those_that_setup_py_allows() -> None:
+    pins, bounds = _pins("lowest.txt"), _bounds()
+    # Not a part of what is tested with the lowest versions; see setup.sh.
+    assert bounds.keys() - pins.keys() == {"distributed", "minigrid"}
+    assert pins.keys() <= bounds.keys()
+    for name, pin in pins.items():
+        assert (pin + ".").startswith(bounds[name] + "."), name
+
+
+def test_the_bounds_admit_what_ubuntu_and_jazzy_ship() -> None:
+    pins, bounds = _pins("jazzy.txt"), _bounds()
+    assert pins.keys() <= bounds.keys()
+    assert {"numpy", "scikit-learn", "networkx", "py_trees"} <= pins.keys()
+    assert [name for name, pin in pins.items() if _release(pin) < _release(bounds[name])] == []
+
+
 def test_the_version_is_the_same_everywhere() -> None:
     version = _manifest().findtext("version")
     assert _setup_arguments()["version"] == version

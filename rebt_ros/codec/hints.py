@@ -42,7 +42,8 @@ def record(
         TypeError: A type hint has no form.
     """
     hints = get_type_hints(kind, include_extras=True)
-    defaults = {field.name: _default(field) for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    own = dataclasses.fields(kind)  # type: ignore[arg-type]
+    defaults = {field.name: _default(field) for field in own}
     derived: list[Field[T]] = []
     for field in fields or tuple(defaults):
         if isinstance(field, str):
