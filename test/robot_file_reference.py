@@ -23,7 +23,7 @@ Every key of a [robot file](robot_file.md). `test/robot_file_reference.py` makes
 
 #: What the maps of the schema are called, and how they are told apart.
 _TITLES: Final = {
-    "feature": "A feature that is more than a path",
+    "feature": "A feature with more than a path",
     "path_actions": "Actions from a field",
     "joy_actions": "Actions from a joystick",
     "twist_actions": "Actions from a velocity",
@@ -41,12 +41,12 @@ def reference() -> str:
     parts = schema["properties"]
     lines = [_HEAD, "## Parts", "", "| part | |", "| --- | --- |"]
     for name, part in parts.items():
-        needed = " (needed)" if name in schema["required"] else ""
+        needed = " (required)" if name in schema["required"] else ""
         lines.append(f"| `{name}`{needed} | {part['description']} |")
     settings = next(
         form for form in parts["topics"]["additionalProperties"]["oneOf"] if "properties" in form
     )
-    lines += ["", "## A topic of which more is known than its type", "", *_table(settings, schema)]
+    lines += ["", "## A topic with more than a type", "", *_table(settings, schema)]
     for name, title in _TITLES.items():
         lines += ["", f"## {title}", "", *_table(schema["$defs"][name], schema)]
     return "\n".join(lines) + "\n"
@@ -57,7 +57,7 @@ def _table(form: Any, schema: Any) -> Iterator[str]:
     yield "| --- | --- | --- | --- |"
     for name, its in form["properties"].items():
         whole = _resolved(its, schema)
-        needed = "needed" if name in form.get("required", ()) else ""
+        needed = "required" if name in form.get("required", ()) else ""
         default = f"`{json.dumps(whole['default'])}`" if "default" in whole else needed
         yield f"| `{name}` | {_value(whole, schema)} | {default} | {whole.get('description', '')} |"
 
