@@ -4,7 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo studio test test-lowest bench bench-driving bench-recorder bench-scale experiment fuzz soak lint format clean
+.PHONY: help setup build demo studio test test-lowest bench bench-driving bench-recorder bench-scale experiment fuzz soak references lint format clean
 
 # An interpreter for .venv other than the one that setup.sh would choose.
 PYTHON ?=
@@ -101,6 +101,10 @@ soak: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 soak: setup ## Run the nodes under load and random faults; nothing may get lost (MINUTES=10, SEED=7, ARGS=--verbose).
 	@PYTHONPATH=test:. $(VENV_PYTHON) -m soak --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) \
 	    --output bench-results/soak.json $(ARGS)
+
+references: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+references: setup ## Make the reference pages of docs/ from what the code declares.
+	@PYTHONPATH=.:test:$$PYTHONPATH $(VENV_PYTHON) test/references.py
 
 lint: setup ## Check style, formatting and types.
 	@status=0; \

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import ast
+import contextlib
 import json
 import re
+import shlex
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import pytest
+import references
 import robot_file_reference
 import strategies as some
+import yaml
 
 from rebt_ros.behavior_tree import document
 from rebt_ros.behavior_tree.shown import MOST_SHOWN_LEAVES
@@ -55,6 +63,156 @@ def test_the_reference_of_robot_files_is_that_of_their_schema() -> None:
     schema: Any = json_schema()
     maps = {name for name, form in schema["$defs"].items() if "properties" in form}
     assert maps == robot_file_reference._TITLES.keys()
+
+
+@pytest.mark.parametrize("name", references.PAGES)
+def test_a_reference_page_is_what_the_code_declares(name: str) -> None:
+    pytest.importorskip("rclpy")
+    page = (_DOCS / name).read_text(encoding="utf-8")
+    assert references.PAGES[name]() == page, "the page is not fresh: run 'make references'"
+
+
+def pages() -> list[Path]:
+    checkout = _DOCS.parent
+    return [*sorted(_DOCS.glob("*.md")), checkout / "README.md", checkout / "CONTRIBUTING.md"]
+
+
+def code_of(page: Path) -> list[str]:
+    """The lines of a page's blocks of code for a shell, those that go on joined."""
+    lines: list[str] = []
+    language: str | None = None
+    for line in page.read_text(encoding="utf-8").replace("\\\n", " ").splitlines():
+        if line.startswith("```"):
+            language = line.strip("`") if language is None else None
+        elif language in ("", "bash"):
+            lines.append(line)
+    return lines
+
+
+def command_lines(page: Path) -> Iterator[tuple[str, list[str]]]:
+    """The executables of this package that a page runs, with their arguments."""
+    for line in code_of(page):
+        _, run, rest = re.sub(r"\$\([^)]*\)", "X", line).partition("ros2 run rebt_ros ")
+        if run:
+            words = shlex.split(rest, comments=True)
+            ends = [place for place, word in enumerate(words) if word in {">", "&", "|", "&&"}]
+            name, *arguments = words[: min(ends, default=len(words))]
+            yield name, arguments
+
+
+def test_every_command_in_the_docs_has_the_options_that_it_is_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("rclpy")
+    monkeypatch.chdir(tmp_path)
+    # Read while the command line is.
+    (tmp_path / "robot.yaml").write_text("state: {x: /o.x}\nactions: {a: /a.data}\n")
+    parameters = (_DOCS / "parameter_reference.md").read_text(encoding="utf-8")
+    commands = references.commands()
+    checked = 0
+    for page in pages():
+        for name, arguments in command_lines(page):
+            checked += 1
+            if name in commands:
+                with contextlib.redirect_stderr(None):
+                    try:
+                        references.parser_of(name).parse_args(arguments)
+                    except SystemExit:
+                        pytest.fail(f"{page.name}: {name} {shlex.join(arguments)}")
+                continue
+            [section] = re.findall(rf"^## {name}\n(.*?)(?:^## |\Z)", parameters, re.M | re.DOTALL)
+            given = pairwise(arguments)
+            for parameter in (word.split(":=")[0] for flag, word in given if flag == "-p"):
+                assert f"| `{parameter}` |" in section, (page.name, name, parameter)
+    assert checked >= 60
+
+
+def test_every_make_target_in_the_docs_exists() -> None:
+    makefile = (_DOCS.parent / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([\w-]+):", makefile, re.MULTILINE))
+    used = {
+        (page.name, target)
+        for page in pages()
+        for line in (*code_of(page), *re.findall(r"`(make [^`]*)`", page.read_text("utf-8")))
+        for target in re.findall(r"^make ([a-z][\w-]*)", line)
+    }
+    assert len(used) >= 10
+    assert {one for one in used if one[1] not in targets} == set()
+
+
+def anchors(page: Path) -> set[str]:
+    """What links may name in a page, as GitHub makes it of headings."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", one).strip().lower().replace(" ", "-") for one in headings}
+
+
+def test_every_link_leads_somewhere() -> None:
+    broken = []
+    for page in [*pages(), _DOCS.parent / "QUALITY_DECLARATION.md"]:
+        text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+        for link in re.findall(r"\]\(([^)\s]+)\)", text):
+            if re.match(r"https?:", link):
+                continue
+            file, _, anchor = link.partition("#")
+            target = page.parent / file if file else page
+            if not target.exists() or (anchor and anchor not in anchors(target)):
+                broken.append((page.name, link))
+    assert broken == []
+
+
+def test_every_page_is_in_a_drawer() -> None:
+    index = (_DOCS / "README.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (\w[\w-]*):", index, re.MULTILINE) == [
+        "Tutorials",
+        "How-to",
+        "Reference",
+        "Explanation",
+    ]
+    named = set(re.findall(r"\]\((\w+\.md)", index))
+    assert {page.name for page in _DOCS.glob("*.md")} - named == {"README.md"}
+
+
+def test_the_page_on_the_paper_names_functions_that_name_their_lines() -> None:
+    page = (_DOCS / "paper.md").read_text(encoding="utf-8")
+    package = _DOCS.parent / "rebt_ros"
+    rows = re.findall(r"^\| ([\d to]+) \| .* \| `([\w/]+\.py)` \| `(\w+)` \|$", page, re.MULTILINE)
+    assert len(rows) >= 18
+    algorithms = [package / "paper" / name for name in ("re_bt_espresso.py", "lat_trees.py")]
+    for lines, module, function in rows:
+        text = (package / module).read_text(encoding="utf-8")
+        defined = {one.name for one in ast.parse(text).body if isinstance(one, ast.FunctionDef)}
+        assert function in defined, (lines, module, function)
+        said = text + "".join(one.read_text(encoding="utf-8") for one in algorithms)
+        assert re.search(rf"\b[Ll]ines? {lines}\b", said), (lines, module, function)
+
+
+def test_the_commands_on_export_and_on_groot2_work_as_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    # Any input does in place of the bag.
+    (tmp_path / "my_bag").mkdir()
+    rows = "".join(f"{x / 10},{'go' if x < 20 else 'turn'}\n" for x in range(40))
+    (tmp_path / "my_bag" / "shown.csv").write_text(f"front,action\n{rows}")
+    ran = []
+    for page in ("export.md", "groot2.md"):
+        for name, arguments in command_lines(_DOCS / page):
+            if name in ("export", "learn", "replay"):
+                references.main_of(name)(arguments)
+                ran.append(name)
+    assert {"export", "learn", "replay"} <= set(ran)
+    assert capsys.readouterr().err == ""
+    for written in ("learned/btcpp.xml", "tree.xml", "my_bag.btlog"):
+        assert (tmp_path / written).stat().st_size > 0
+
+
+def test_rosdoc2_can_read_its_settings_and_finds_the_pages() -> None:
+    checkout = _DOCS.parent
+    head, settings = yaml.safe_load_all((checkout / "rosdoc2.yaml").read_text(encoding="utf-8"))
+    assert head == {"type": "rosdoc2 config", "version": 1}
+    assert [list(builder) for builder in settings["builders"]] == [["sphinx"]]
+    assert isinstance(settings["settings"], dict)
+    assert (checkout / "doc" / "README.md").samefile(_DOCS / "README.md")
 
 
 def test_the_page_on_learning_names_the_limits() -> None:
