@@ -40,6 +40,8 @@ from rebt_ros.learning.report import FORECAST, LearningReport
 from rebt_ros.offline import learning_from_files
 from rebt_ros.offline.exports import write_export
 from rebt_ros.offline.result import OfflineLearning
+from rebt_ros.storage.input_options import InputOptions
+from rebt_ros.storage.weights_file import read_weights
 
 _REDUCTIONS = {
     "domain": "do not use that thresholds, categories and last actions exclude each other",
@@ -166,6 +168,13 @@ def _add_rows(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
         "demonstrations where rows are samples, else 0 (default: auto)",
     )
     rows.add_argument(
+        "--weights",
+        type=_weights,
+        metavar="FILE",
+        help="how much demonstrations count: lines NAME,WEIGHT, or a JSON object; names as in "
+        "--exclude; others count 1, and 0 leaves one out (docs/learning.md)",
+    )
+    rows.add_argument(
         "--upsample",
         type=word_of(Upsampling),
         default=defaults.upsample,
@@ -173,6 +182,12 @@ def _add_rows(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
         help="make up rows for rare actions, for decision trees to be fitted to and never judged "
         "on; svm-smote needs the package imbalanced-learn (default: none)",
     )
+
+
+def _weights(text: str) -> Path:
+    if not text.strip():
+        raise argparse.ArgumentTypeError("a file needs a name: name one, or leave it out")
+    return Path(text)
 
 
 def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
@@ -410,7 +425,7 @@ def _learn(parsed: argparse.Namespace) -> None:
             parsed.inputs,
             out=parsed.out,
             options=_options(parsed),
-            reading=input_options(parsed, progress),
+            reading=_reading(parsed, progress),
             declared=_declared(parsed),
             levels=parsed.levels,
             most_levels=parsed.most_levels,
@@ -447,6 +462,15 @@ def _learn(parsed: argparse.Namespace) -> None:
     if parsed.export is not None:
         exported = write_export(parsed.out, result.learned, parsed.export)
         print(f"Exported to {exported}.")
+
+
+def _reading(parsed: argparse.Namespace, progress: ProgressBar) -> InputOptions:
+    reading = input_options(parsed, progress)
+    return (
+        reading
+        if parsed.weights is None
+        else replace(reading, weights=read_weights(parsed.weights))
+    )
 
 
 def _declared(parsed: argparse.Namespace) -> dict[str, FeatureKind]:

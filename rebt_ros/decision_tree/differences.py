@@ -55,7 +55,7 @@ def likely_differences(
     some = table.where(np.arange(len(table)) % step == 0)
     every = Vocabulary(vocabulary.history, possible)
     classifier = DecisionTreeClassifier(random_state=random_state)
-    classifier.fit(encode(some, every), some.chosen)
+    classifier.fit(encode(some, every), some.chosen, sample_weight=some.row_weights)
     first = len(columns(table, FEATURES_ALONE))
     shares = classifier.feature_importances_[first : first + len(possible)]
     ranked = np.argsort(-shares, kind="stable")[:_MOST_DIFFERENCES]

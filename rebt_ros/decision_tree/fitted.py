@@ -210,7 +210,7 @@ class FittedTree:
         return thresholds
 
     def hits(self, table: DemonstrationTable, ccp_alphas: FloatArray) -> IntArray:
-        """How many of a table's rows of each action each pruning level predicts.
+        """How many of a table's rows of each action each pruning level predicts, by their weights.
 
         A node decides at the levels from its own ``collapse`` up to its parent's.  So the rows that
         a level predicts are those that reach its deciding nodes with their majority action, and
@@ -226,7 +226,7 @@ class FittedTree:
         count = len(self.grown)
         reached = _reached(self.grown, table, self.vocabulary)
         actions = len(table.actions)
-        counts = np.bincount(reached * actions + table.chosen, minlength=count * actions)
+        counts = table.counts(reached * actions + table.chosen, count * actions)
         counts = counts.reshape(count, actions)
         # Rows that reach a node reach its parent; parents come before their children.
         for node in range(count - 1, 0, -1):

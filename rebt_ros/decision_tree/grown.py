@@ -23,7 +23,7 @@ class GrownTree:
     threshold: FloatArray
     """With what, shape (nodes,); of no meaning at leaves."""
     counts: IntArray
-    """Rows of each action that it was grown from, shape (nodes, actions)."""
+    """Rows of each action that it was grown from, by their weights, shape (nodes, actions)."""
     risk: FloatArray
     """Impurity times the share of the rows, shape (nodes,)."""
     engine: Callable[[Float32Array], IntArray] | None = None

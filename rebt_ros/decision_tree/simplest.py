@@ -54,4 +54,5 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
 
 def _rank(table: DemonstrationTable, fitted: FittedTree) -> tuple[int, int, float]:
     """The lower, the simpler."""
-    return fitted.leaves, fitted.comparisons, -float(np.mean(fitted.path_lengths(table)))
+    lengths, weights = fitted.path_lengths(table), table.row_weights
+    return fitted.leaves, fitted.comparisons, -float(np.average(lengths, weights=weights))

@@ -88,7 +88,8 @@ def fit_again(
     )
     classifier = options.classifier().set_params(max_features=share)
     with _quiet():
-        classifier.fit(encode(table, fitted.vocabulary), table.chosen)
+        matrix = encode(table, fitted.vocabulary)
+        classifier.fit(matrix, table.chosen, sample_weight=table.row_weights)
     grown = _grown(classifier, len(fitted.actions))
     return replace(fitted, grown=grown, path=pruning_path(grown))
 
@@ -141,6 +142,8 @@ class _Parts:
         # Small numbers: scikit-learn sorts them, and copies them more than once.
         kind = np.min_scalar_type(len(table.actions))
         self._chosen = np.append(table.chosen, table.chosen[again]).astype(kind)
+        its = table.row_weights
+        self._weights = np.ones(len(table)) if its is None else its.astype(np.float64)
         ends = np.cumsum([len(table), *(len(rows) for rows, _ in changed)])
         self._instead = [
             (rows, slice(start, end))
@@ -151,12 +154,12 @@ class _Parts:
         """The tree of the table, for 0, or of a part."""
         weights = np.zeros(len(self._matrix))
         if number:
-            weights[: len(self._table)] = self._parts[number - 1]
+            weights[: len(self._table)] = self._parts[number - 1] * self._weights
             instead, appended = self._instead[number - 1]
             weights[instead] = 0
-            weights[appended] = 1
+            weights[appended] = self._weights[instead]
         else:
-            weights[: len(self._table)] = 1
+            weights[: len(self._table)] = self._weights
         classifier = self._options.classifier()
         classifier.fit(self._matrix, self._chosen, sample_weight=weights)
         return _as_fitted(self._table, classifier, self._options)
@@ -187,14 +190,14 @@ def _quiet() -> Iterator[None]:
 
 def _fitted(table: DemonstrationTable, options: FitOptions) -> FittedTree:
     vocabulary, random_state = options.vocabulary, options.random_state
-    matrix, chosen = encode(table, vocabulary), table.chosen
+    matrix, chosen, weights = encode(table, vocabulary), table.chosen, table.row_weights
     notes: tuple[str, ...] = ()
     if options.upsample is Upsampling.SVM_SMOTE:
         more = svm_smote(matrix, chosen, columns(table, vocabulary), random_state)
         notes = tuple(_notes(table, more))
-        matrix, chosen = more.matrix, more.chosen
+        matrix, chosen, weights = more.matrix, more.chosen, None
     classifier = options.classifier()
-    classifier.fit(matrix, chosen)
+    classifier.fit(matrix, chosen, sample_weight=weights)
     return _as_fitted(table, classifier, options, notes)
 
 
@@ -219,11 +222,11 @@ def _as_fitted(
 
 def _grown(classifier: DecisionTreeClassifier, actions: int) -> GrownTree:
     tree = classifier.tree_
+    weights = tree.weighted_n_node_samples
     # Shares of rows; scaled back to whole rows, which keeps ties exact.
-    rows = np.rint(tree.value[:, 0, :] * tree.n_node_samples[:, np.newaxis]).astype(np.int64)
+    rows = np.rint(tree.value[:, 0, :] * weights[:, np.newaxis]).astype(np.int64)
     counts = np.zeros((tree.node_count, actions), dtype=np.int64)
     counts[:, classifier.classes_] = rows
-    weights = tree.weighted_n_node_samples
     return GrownTree(
         tree.children_left.astype(np.int64),
         tree.children_right.astype(np.int64),

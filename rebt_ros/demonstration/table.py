@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from rebt_ros.demonstration.last_action import (
     previous_actions,
 )
 from rebt_ros.demonstration.schema import TRUTH, Feature, FeatureKind
+from rebt_ros.demonstration.weights import whole_weights
 from rebt_ros.errors import InputError, OptionError
 
 #: Rows that are looked at before all of them are.
@@ -49,6 +51,8 @@ class DemonstrationTable:
     """Position in `actions` of the action of the row before, `NO_ACTION` in a demonstration's first
     row, shape (rows,); None to derive it from `chosen`."""
     row_kind: RowKind = RowKind.EVENT
+    weights: IntArray | None = None
+    """How often the rows of each demonstration count, shape (demonstrations,); None: once."""
     robot: object = None
     """The `RobotFile` by which its rows were read, for trees to carry; None without one."""
 
@@ -61,6 +65,26 @@ class DemonstrationTable:
 
     def __len__(self) -> int:
         return len(self.chosen)
+
+    @property
+    def row_weights(self) -> IntArray | None:
+        """How often each row counts, shape (rows,); None: once."""
+        return None if self.weights is None else self.weights[self.demonstration]
+
+    def counts(
+        self, codes: IntArray, least: int, rows: BoolArray | slice = slice(None)
+    ) -> IntArray:
+        """How often each code is that of a row, by the weights of the rows, shape (codes,).
+
+        Args:
+            codes: Of some rows, shape (some,).
+            least: So many codes at least.
+            rows: Which rows these are.
+        """
+        weights = self.row_weights
+        if weights is None:
+            return np.bincount(codes, minlength=least)
+        return np.bincount(codes, weights[rows], least).astype(np.int64)
 
     def where(self, rows: BoolArray) -> DemonstrationTable:
         """The table of some rows only.
@@ -160,6 +184,7 @@ def part_of(table: DemonstrationTable, rows: int) -> DemonstrationTable:
 def tabulate(
     demonstrations: Sequence[Demonstration],
     declared: Mapping[str, FeatureKind] | None = None,
+    weights: Sequence[Fraction] = (),
 ) -> tuple[DemonstrationTable, ...]:
     """Joins demonstrations into one table per channel.
 
@@ -167,11 +192,18 @@ def tabulate(
         demonstrations: At least one; all with the same features in the same order.
         declared: Kinds of features by name.  A feature that is not declared and holds nothing but
             0 and 1, and both of them, is binary; otherwise it stays what it is.
+        weights: How much each demonstration counts, above 0; empty: all alike.
 
     Raises:
         InputError: No rows, or demonstrations whose features or kinds of rows differ.
-        OptionError: A declared feature does not exist or does not hold such values.
+        OptionError: A declared feature does not exist or does not hold such values, or weights are
+            too large (see `whole_weights`).
     """
+    whole = whole_weights(
+        [weight for weight, one in zip(weights, demonstrations, strict=True) if len(one)]
+        if weights
+        else []
+    )
     demonstrations = [demonstration for demonstration in demonstrations if len(demonstration)]
     if not demonstrations:
         raise InputError(
@@ -184,7 +216,11 @@ def tabulate(
     )
     row_kind = _common_row_kind(demonstrations)
     return tuple(
-        replace(_channel_table(channel, demonstrations, features, states), row_kind=row_kind)
+        replace(
+            _channel_table(channel, demonstrations, features, states),
+            row_kind=row_kind,
+            weights=whole,
+        )
         for channel in channels
     )
 

@@ -5,7 +5,8 @@ recall
     learned from.
 
 A level is judged by its mean recall over all actions, so that an action that is rare but decisive
-counts as much as a frequent one (see `judged_levels`).
+counts as much as a frequent one (see `judged_levels`).  Rows count by the weights of their
+demonstrations.
 """
 
 from __future__ import annotations
@@ -119,7 +120,7 @@ class CrossValidation:
 
     @property
     def _shown(self) -> IntArray:
-        counts = [np.bincount(rows.chosen, minlength=self._actions) for _, rows in self._folds]
+        counts = [rows.counts(rows.chosen, self._actions) for _, rows in self._folds]
         return np.array(counts)
 
     def _judged(self, ccp_alphas: FloatArray, hits: list[IntArray]) -> JudgedLevels:
@@ -138,7 +139,7 @@ class CrossValidation:
             level = fitted.path.leaves_at(ccp_alpha).tobytes()
             if level not in known:
                 right = choices(fitted.at(ccp_alpha), rows) == rows.chosen
-                known[level] = np.bincount(rows.chosen[right], minlength=self._actions)
+                known[level] = rows.counts(rows.chosen[right], self._actions, right)
             found.append(known[level])
         self._step()
         return np.array(found)

@@ -22,6 +22,7 @@ from rebt_ros.decision_tree.pruning import pruning_path
 from rebt_ros.demonstration.last_action import NO_ACTION, History
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.demonstration.weights import LARGEST_WEIGHT
 from rebt_ros.errors import InputError, RebtError
 from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.judged_levels import JudgedLevels
@@ -136,6 +137,8 @@ def saved(learning: Learning) -> Saved | None:
     arrays |= {"held_out": evidence.held_out, "intended": evidence.intended}
     if table.before is not None:
         arrays["table.before"] = table.before
+    if table.weights is not None:
+        arrays["table.weights"] = table.weights
     for role, fitted in (("fitted", evidence.fitted), ("judge", evidence.judge)):
         arrays |= {f"{role}.{name}": getattr(fitted.grown, name) for name in _TREE}
     if learning.policy.levels is not None:
@@ -192,6 +195,7 @@ def _restored(words: _Words, arrays: Mapping[str, npt.NDArray[Any]]) -> Learning
         before=_of(arrays, "table.before", np.int64) if "table.before" in arrays else None,
         previous=_of(arrays, "table.previous", np.int64),
         row_kind=plain.row_kind,
+        weights=_of(arrays, "table.weights", np.int64) if "table.weights" in arrays else None,
         robot=plain.robot,
     )
     _check_table(table)
@@ -284,6 +288,11 @@ def _check_table(table: DemonstrationTable) -> None:
     ):
         if codes.shape != (rows,) or not _within(codes, least, count):
             raise ValueError(f"{name} are out of range")
+    if table.weights is not None and (
+        table.weights.shape != (len(table.demonstrations),)
+        or not _within(table.weights, 1, LARGEST_WEIGHT + 1)
+    ):
+        raise ValueError("weights are not those of the demonstrations")
     for feature, column in zip(table.features, table.states.T, strict=True):
         codes = column[~np.isnan(column)]
         end = {FeatureKind.BINARY: 2, FeatureKind.CATEGORICAL: len(feature.categories)}

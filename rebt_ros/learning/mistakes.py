@@ -48,6 +48,8 @@ def intended_actions(table: DemonstrationTable) -> IntArray:
         Positions in ``table.actions``, shape (rows,); deterministic.
     """
     chosen = table.chosen
+    # What looks like a mistake is told from what was done, however much that counts.
+    table = replace(table, weights=None)
     if table.row_kind is RowKind.EVENT or len(table) > _MOST_ROWS:
         return chosen
     held, before, after = _held(table)

@@ -18,6 +18,7 @@ from rebt_ros.behavior_tree.learned_tree import (
 from rebt_ros.beyond_the_paper.reductions import MOST_LEAVES_IN_BEST_ORDER, MOST_LEAVES_MINIMIZED
 from rebt_ros.beyond_the_paper.routines.finding import find_routines
 from rebt_ros.decision_tree.fitted import TrainedTree
+from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.demonstration.lags import evenly_spaced, with_lags
 from rebt_ros.demonstration.last_action import History
@@ -185,6 +186,11 @@ def learn_from(
         options: How to learn.
         progress: Told what is being done and which share of the work is behind.
     """
+    if table.weights is not None and options.upsample is not Upsampling.NONE:
+        raise OptionError(
+            "rows are made up for rare actions, which have no weights, where the demonstrations "
+            "have some: leave out the upsampling or the weights."
+        )
     late = reaction_time_of(table, options)
     table = shifted(table, late.rows)
     if len(np.unique(table.chosen)) < 2:
@@ -284,7 +290,8 @@ def reaction_time_of(table: DemonstrationTable, options: LearnOptions) -> Reacti
         return given(table, options.reaction_time)
     if table.row_kind is RowKind.EVENT:
         return given(table, 0.0)
-    return estimate(table)
+    # How late people are is told from what they did, however much that counts.
+    return estimate(replace(table, weights=None))
 
 
 def _late(provenance: Provenance, late: ReactionTime) -> Provenance:

@@ -56,15 +56,23 @@ class LearningReport:
     agreement: float | None
     """In cross-validation, after what the demonstrator did before: the forecast of success."""
     most_frequent: float
-    """Share of the rows that always taking the most frequent action would agree with."""
+    """Share of the rows that always taking the most frequent action would agree with, by their
+    weights."""
     conflicts: int
     """Rows."""
     conflicts_after_history: int
     """Rows in conflict with others before which the same was done, where the tree may test it."""
     rows: int
+    weighted: bool = False
+    """Whether demonstrations have weights, by which rows count in cross-validation."""
 
     def notes(self) -> Iterator[str]:
         """What should make a person look twice; no full stops."""
+        if self.weighted:
+            yield (
+                "demonstrations have weights: trees are grown, and recalls and agreement in "
+                "cross-validation are counted by them; other figures count each row once"
+            )
         for action in self.actions:
             if not action.taken:
                 yield (
@@ -113,6 +121,7 @@ class LearningReport:
             "cross_validated_mean_recall": self.mean_recall,
             "cross_validated_agreement": self.agreement,
             "most_frequent_action": self.most_frequent,
+            "weighted": self.weighted,
             "conflicting_rows": self.conflicts,
             "conflicting_rows_after_history": self.conflicts_after_history,
         }
@@ -147,6 +156,7 @@ def report_on(
         ccp_alpha: The level that was chosen.
     """
     shown = np.bincount(table.chosen, minlength=len(table.actions))
+    weighed = table.counts(table.chosen, len(table.actions))
     recalls: list[float | None] = [None] * len(shown)
     mean_recall = agreement = None
     if levels is not None:
@@ -167,10 +177,11 @@ def report_on(
         ),
         mean_recall,
         agreement,
-        float(shown.max() / len(table)),
+        float(weighed.max() / weighed.sum()),
         conflicts,
         after_history,
         len(table),
+        table.weights is not None,
     )
 
 

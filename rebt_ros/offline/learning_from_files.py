@@ -47,6 +47,9 @@ _TOPIC = re.compile(r"/?(?:[A-Za-z_]\w*/)*[A-Za-z_]\w*", re.ASCII)
 #: So many different ones can be actions even where each was shown once or twice.
 _FEW_ACTIONS = 20
 
+#: How many names a note lists.
+_LISTED = 8
+
 #: Of all the work, where pruning levels are written.
 _LEARNING_SHARE = 0.3
 
@@ -98,7 +101,8 @@ def learn(
     paths = as_paths(inputs)
     loaded = load(paths, replace(reading, features=reading.features | frozenset(declared)))
     tables = tuple(
-        replace(table, robot=loaded.robot) for table in tabulate(loaded.demonstrations, declared)
+        replace(table, robot=loaded.robot)
+        for table in tabulate(loaded.demonstrations, declared, loaded.weights)
     )
     asked = rules_for(given, loaded.robot)
     learning = _part(progress, 0.0, _LEARNING_SHARE) if levels else progress
@@ -111,7 +115,8 @@ def learn(
     if asked is not None:
         kept = _ruled(learned, asked, loaded.demonstrations, repair)
         learned, proven = kept.learned, kept.rules
-    notes = (*loaded.notes, *further, *_not_on_a_robot(learned))
+    weights = _weights(tables[0])
+    notes = (*loaded.notes, *_on_weights(weights), *further, *_not_on_a_robot(learned))
     result = OfflineLearning(
         learned,
         learnings,
@@ -120,6 +125,7 @@ def learn(
         proven,
         aside=loaded.aside,
         excluded=loaded.excluded,
+        weights=weights,
     )
     if out is not None:
         writing = _part(progress, _LEARNING_SHARE, 1.0)
@@ -214,6 +220,24 @@ def _not_on_a_robot(learned: LearnedTree) -> Iterator[str]:
                 f"{channel!r} is no name of a topic, so that the executor refuses this tree: "
                 "rename the label column, with letters, digits and underscores"
             )
+
+
+def _weights(table: DemonstrationTable) -> dict[str, int]:
+    """How often the rows of each demonstration count; empty where all count once."""
+    if table.weights is None:
+        return {}
+    return dict(zip(table.demonstrations, table.weights.tolist(), strict=True))
+
+
+def _on_weights(weights: Mapping[str, int]) -> Iterator[str]:
+    """Says how much demonstrations count."""
+    by_weight: dict[int, list[str]] = {}
+    for name, weight in weights.items():
+        by_weight.setdefault(weight, []).append(name)
+    for weight, names in sorted(by_weight.items()):
+        more = ", ..." if len(names) > _LISTED else ""
+        times = "once" if weight == 1 else f"{weight} times"
+        yield f"each row counts {times} in {', '.join(names[:_LISTED])}{more}"
 
 
 def _refuse_what_are_no_actions(table: DemonstrationTable) -> None:

@@ -42,6 +42,8 @@ class OfflineLearning:
     """Inputs that could not be read, and were left out."""
     excluded: tuple[Path, ...] = ()
     """Inputs that were left out as asked."""
+    weights: Mapping[str, int] = field(default_factory=dict)
+    """How often the rows of each demonstration count; empty where all count once."""
 
 
 def write_summary(
@@ -53,6 +55,7 @@ def write_summary(
         "accounts": {name: account.as_json() for name, account in result.accounts.items()},
         "set_aside": [{"path": str(aside.path), "reason": aside.reason} for aside in result.aside],
         "excluded": [str(path) for path in result.excluded],
+        "weights": dict(result.weights),
         "notes": list(result.notes),
         "random_state": options.random_state,
         "upsample": options.upsample.value,

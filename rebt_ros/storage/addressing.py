@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
+from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
@@ -71,33 +72,40 @@ def _there(address: str) -> Path | None:
         return None
 
 
-def excluded(
-    names: Sequence[str], paths: Sequence[Path], addresses: Sequence[str]
-) -> frozenset[int]:
-    """Which demonstrations are left out.
+def weighted(
+    names: Sequence[str],
+    paths: Sequence[Path],
+    addresses: Sequence[str] = (),
+    weights: Sequence[tuple[str, Fraction]] = (),
+) -> tuple[Fraction, ...]:
+    """How much demonstrations count; those that are left out count 0.
 
     Args:
         names: Of all demonstrations.
         paths: Of their files.
-        addresses: As in `Demonstrations.meant`, or ``@`` with the path of a list of addresses.
+        addresses: Of what is left out: as in `Demonstrations.meant`, or ``@`` with the path of a
+            list of addresses.
+        weights: Addresses with what they count, of which the last one that fits tells.
 
     Raises:
         InputError: An address means no demonstration, all are left out, or a list cannot be read.
     """
     demonstrations = Demonstrations(names, paths)
-    out = {
-        number
-        for address in addresses
-        for line in _lines(address, names)
-        for number in demonstrations.meant(line)
-    }
-    if len(out) == len(names):
+    counting = [Fraction(1)] * len(names)
+    for address, weight in weights:
+        for number in demonstrations.meant(address):
+            counting[number] = weight
+    for address in addresses:
+        for line in _lines(address, names):
+            for number in demonstrations.meant(line):
+                counting[number] = Fraction(0)
+    if not any(counting):
         raise InputError(
             f"all {len(names)} demonstrations are left out: there is nothing else to read."
             if len(names) > 1
             else f"{names[0]} is left out: there is nothing else to read."
         )
-    return frozenset(out)
+    return tuple(counting)
 
 
 def _lines(address: str, names: Sequence[str]) -> tuple[str, ...]:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from fractions import Fraction
 from pathlib import Path
 
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.errors import OptionError
 from rebt_ros.robot_file.robot_file import RobotFile
+from rebt_ros.storage.weights import weight
+
+_PAIR = 2
 
 
 class InputKind(Enum):
@@ -93,6 +97,10 @@ class InputOptions:
     exclude: tuple[str, ...] = ()
     """Demonstrations that are left out, before they are read: names of files, paths, patterns, and
     `@list.txt` with such in its lines."""
+    weights: tuple[tuple[str, Fraction], ...] = ()
+    """How much demonstrations count, by such names, of which the last one that fits tells; also as
+    a mapping.  Others count 1, and what counts 0 is left out.  Where nothing is learned, only that
+    matters."""
     plan: ReadingPlan = field(default_factory=ReadingPlan)
     """By which means they are read."""
 
@@ -104,6 +112,7 @@ class InputOptions:
         """
         for name in ("labels", "channels", "action_topics", "exclude"):
             object.__setattr__(self, name, _texts(name, getattr(self, name)))
+        object.__setattr__(self, "weights", _weights(self.weights))
         topics = self.state_topics
         several = (topics,) if isinstance(topics, str | StateTopic) else topics
         object.__setattr__(
@@ -127,6 +136,17 @@ class InputOptions:
         ):
             if not fits:
                 raise OptionError(f"{name} must be {what}, not {getattr(self, name)!r}.")
+
+
+def _weights(value: object) -> tuple[tuple[str, Fraction], ...]:
+    """Weights by names, also of a mapping."""
+    pairs = tuple(value.items()) if isinstance(value, Mapping) else value
+    if not isinstance(pairs, tuple) or not all(
+        isinstance(pair, tuple) and len(pair) == _PAIR and isinstance(pair[0], str)
+        for pair in pairs
+    ):
+        raise OptionError(f"weights must be numbers by names of demonstrations, not {value!r}.")
+    return tuple((name, weight(its)) for name, its in pairs)
 
 
 def _texts(name: str, value: object) -> tuple[str, ...]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from pathlib import Path
 
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.errors import InputError, OptionError, RebtError
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.account import Account
-from rebt_ros.storage.addressing import excluded
+from rebt_ros.storage.addressing import weighted
 from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.column_names import FEWEST_RISING
 from rebt_ros.storage.csv_table import read_csv
@@ -45,6 +46,8 @@ class Loaded:
     """Of the demonstrations."""
     excluded: tuple[Path, ...] = ()
     """What was left out as asked, in the order of the inputs."""
+    weights: tuple[Fraction, ...] = ()
+    """How much each demonstration counts."""
 
 
 def as_paths(inputs: Sequence[str | Path] | str | Path) -> tuple[Path, ...]:
@@ -75,13 +78,20 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
 
     Raises:
         InputError: There is no input, one is there twice, or one cannot be read; if the plan is
-            not strict, none can be read.
+            not strict, none can be read; what is left out or weighed is not there, or is all.
         OptionError: An option is for a kind of input that none is of.
         WorkerError: What reads elsewhere does not work.
     """
     options = options or InputOptions()
-    every = sources_of(inputs, strict=options.plan.strict and not options.exclude)
-    sources, left_out = _without_excluded(every, options)
+    is_chosen = bool(options.exclude or options.weights)
+    every = sources_of(inputs, strict=options.plan.strict and not is_chosen)
+    paths = [one.path for one in every]
+    counting = weighted(names_of(every), paths, options.exclude, options.weights)
+    left_out = tuple(path for path, count in zip(paths, counting, strict=True) if not count)
+    sources = [one for one, count in zip(every, counting, strict=True) if count]
+    strange_one = next((one for one in sources if isinstance(one, Strange)), None)
+    if strange_one is not None and options.plan.strict:
+        raise strange_one.error
     readable = [one for one in sources if isinstance(one, Source)]
     _check_options(options, {source.kind for source in readable})
     strange = {one.path: one.error for one in sources if isinstance(one, Strange)}
@@ -92,6 +102,7 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         if isinstance(answer, RebtError)
     }
     aside = _aside([one.path for one in sources if one.path in errors], errors, len(sources))
+    weights = dict(zip(paths, counting, strict=True))
     names = dict(zip((one.path for one in sources), names_of(sources), strict=True))
     there = [
         (source.path, _named(answer, names[source.path]))
@@ -118,27 +129,8 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         aside,
         tuple(path for path, _ in there),
         left_out,
+        tuple(weights[path] for path, _ in there),
     )
-
-
-def _without_excluded(
-    sources: Sequence[Source | Strange], options: InputOptions
-) -> tuple[list[Source | Strange], tuple[Path, ...]]:
-    """The inputs that are not left out, and the paths of those that are.
-
-    Raises:
-        InputError: What is left out is not there, or is all; or the plan is strict and another one
-            is nothing to read.
-    """
-    if not options.exclude:
-        return list(sources), ()
-    paths = [one.path for one in sources]
-    out = excluded(names_of(sources), paths, options.exclude)
-    kept = [one for place, one in enumerate(sources) if place not in out]
-    strange = next((one for one in kept if isinstance(one, Strange)), None)
-    if strange is not None and options.plan.strict:
-        raise strange.error
-    return kept, tuple(paths[place] for place in sorted(out))
 
 
 def _named(read: Read, name: str) -> Read:

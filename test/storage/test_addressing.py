@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import rebt_ros
 from rebt_ros.commands import inspect, learn
 from rebt_ros.errors import InputError
-from rebt_ros.storage.addressing import Demonstrations, excluded
+from rebt_ros.storage.addressing import Demonstrations, weighted
 from rebt_ros.storage.input_options import InputOptions, ReadingPlan
 from rebt_ros.storage.inputs import load
 
@@ -135,8 +135,9 @@ def test_what_is_meant_is_left_out_and_nothing_else(chosen: set[int], by_path: b
         addresses = [f"[{address[0]}]{address[1:]}" for address in addresses]
     if len(chosen) == 4:
         with pytest.raises(InputError):
-            excluded(known, PATHS, addresses)
+            weighted(known, PATHS, addresses)
     else:
-        assert excluded(known, PATHS, addresses) == chosen
+        counting = weighted(known, PATHS, addresses)
+        assert {place for place, count in enumerate(counting) if not count} == chosen
     for place, name in enumerate(known):
         assert Demonstrations(known, PATHS).meant(name) == (place,)
