@@ -112,6 +112,7 @@ TWO_CHANNELS = st.tuples(ACTING, ACTING).map(
 
 
 @pytest.mark.parametrize("from_xml", [False, True])
+@settings(max_examples=60)
 @given(
     st.one_of(some.trees(), some.trees(), TWO_CHANNELS),
     st.integers(0, 10**6),
@@ -207,7 +208,7 @@ def test_what_cannot_carry_out_an_action_is_refused(give: Any, says: str) -> Non
         rebt_ros.to_py_trees(some.learned(tree), give(go, turn), dict)
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(some.learned_trees())
 def test_whatever_is_learned_has_names_that_the_parser_takes(
     tmp_path_factory: pytest.TempPathFactory, learned: rebt_ros.LearnedTree
