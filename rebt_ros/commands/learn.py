@@ -67,6 +67,7 @@ _ASKED = (
     "readable_thresholds",
     "simplest",
     "refit",
+    "exact",
     "root",
     "psa",
 )
@@ -231,6 +232,14 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
         metavar=_values(Use),
         help="whether PSA nodes stand in the tree; auto: where they raise agreement in "
         "cross-validation (default: auto)",
+    )
+    learning.add_argument(
+        "--exact",
+        action="store_true",
+        default=None,
+        help="grow trees on all rows, also where there are more than 100,000: otherwise on a "
+        "sample of whole demonstrations, with those of rare actions, and only prune, choose and "
+        "count by all rows",
     )
     learning.add_argument(
         "--random-state", type=int, default=defaults.random_state, help="default: %(default)s"
@@ -445,6 +454,8 @@ def _learn(parsed: argparse.Namespace) -> None:
     for learning in result.learnings:
         if len(result.learnings) > 1:
             print(f"Channel {learning.table.channel}:")
+        if learning.report.sample is not None:
+            print(learning.report.sample.sentence)
         print("\n".join(_recalls(learning.report)))
     for learning in result.learnings:
         channel = f"{learning.table.channel}: " if len(result.learnings) > 1 else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -227,10 +228,7 @@ class FittedTree:
         reached = _reached(self.grown, table, self.vocabulary)
         actions = len(table.actions)
         counts = table.counts(reached * actions + table.chosen, count * actions)
-        counts = counts.reshape(count, actions)
-        # Rows that reach a node reach its parent; parents come before their children.
-        for node in range(count - 1, 0, -1):
-            counts[self.path.parents[node]] += counts[node]
+        counts = self.path.passed(counts.reshape(count, actions))
         majority = self.grown.majority
         predicted = counts[np.arange(count), majority]
         first, end = self.path.levels_decided(ccp_alphas)
@@ -243,9 +241,7 @@ class FittedTree:
 def _reached(grown: GrownTree, table: DemonstrationTable, vocabulary: Vocabulary) -> IntArray:
     """The leaf as grown that each row reaches, shape (rows,)."""
     reached = np.empty(len(table), dtype=np.int64)
-    # In parts, so that a large table is not held a second time.
-    for start in range(0, len(table), _ROWS_AT_A_TIME):
-        rows = slice(start, start + _ROWS_AT_A_TIME)
+    for rows in in_parts(table):
         reached[rows] = grown.apply(encode(table, vocabulary, rows))
     return reached
 
@@ -257,14 +253,17 @@ def _compared(
     thresholds: FloatArray,
 ) -> IntArray:
     """The leaf that each row reaches with thresholds in double precision, shape (rows,)."""
-    values = _Values(grown, table, vocabulary)
-    node = np.zeros(len(table), dtype=np.int64)
-    under_way = np.arange(len(table))
-    while (under_way := under_way[grown.left[node[under_way]] >= 0]).size:
-        at = node[under_way]
-        left = values.of(under_way, grown.column[at]) <= thresholds[at]
-        node[under_way] = np.where(left, grown.left[at], grown.right[at])
-    return node
+    reached = np.empty(len(table), dtype=np.int64)
+    for rows in in_parts(table):
+        values = _Values(grown, table, vocabulary, rows)
+        node = reached[rows]
+        node[:] = 0
+        under_way = np.arange(len(node))
+        while (under_way := under_way[grown.left[node[under_way]] >= 0]).size:
+            at = node[under_way]
+            left = values.of(under_way, grown.column[at]) <= thresholds[at]
+            node[under_way] = np.where(left, grown.left[at], grown.right[at])
+    return reached
 
 
 def _gaps(
@@ -278,28 +277,38 @@ def _gaps(
     Returns:
         Two of shape (nodes,): -inf and inf where there is none.
     """
-    values = _Values(grown, table, vocabulary)
     low, high = np.full(len(grown), -np.inf), np.full(len(grown), np.inf)
-    node = np.zeros(len(table), dtype=np.int64)
-    under_way = np.arange(len(table))
-    while (under_way := under_way[grown.left[node[under_way]] >= 0]).size:
-        at = node[under_way]
-        value = values.of(under_way, grown.column[at])
-        left = value <= thresholds[at]
-        np.maximum.at(low, at[left], value[left])
-        np.minimum.at(high, at[~left], value[~left])
-        node[under_way] = np.where(left, grown.left[at], grown.right[at])
+    for rows in in_parts(table):
+        values = _Values(grown, table, vocabulary, rows)
+        node = np.zeros(rows.stop - rows.start, dtype=np.int64)
+        under_way = np.arange(len(node))
+        while (under_way := under_way[grown.left[node[under_way]] >= 0]).size:
+            at = node[under_way]
+            value = values.of(under_way, grown.column[at])
+            left = value <= thresholds[at]
+            np.maximum.at(low, at[left], value[left])
+            np.minimum.at(high, at[~left], value[~left])
+            node[under_way] = np.where(left, grown.left[at], grown.right[at])
     return low, high
 
 
-class _Values:
-    """What a tree's columns hold in double precision; infinite where it is missing."""
+def in_parts(table: DemonstrationTable) -> Iterator[slice]:
+    """Stretches of a table, so that a large one is not held a second time."""
+    for start in range(0, len(table), _ROWS_AT_A_TIME):
+        yield slice(start, min(start + _ROWS_AT_A_TIME, len(table)))
 
-    def __init__(self, grown: GrownTree, table: DemonstrationTable, vocabulary: Vocabulary) -> None:
+
+class _Values:
+    """What a tree's columns hold in some rows, as doubles; infinite where it is missing."""
+
+    def __init__(
+        self, grown: GrownTree, table: DemonstrationTable, vocabulary: Vocabulary, rows: slice
+    ) -> None:
         self._columns = {}
+        split = set(grown.column.tolist())
         for place, asked in enumerate(columns(table, vocabulary)):
-            if place in grown.column:
-                values = _asked(asked, table)
+            if place in split:
+                values = _asked(asked, table, rows)
                 self._columns[place] = np.where(np.isnan(values), np.inf, values)
 
     def of(self, rows: IntArray, column: IntArray) -> FloatArray:
@@ -311,15 +320,16 @@ class _Values:
         return values
 
 
-def _asked(asked: Number | Indicator, table: DemonstrationTable) -> FloatArray:
-    """What a column asks of each row, in double precision: a number, or 1 for yes; (rows,)."""
+def _asked(asked: Number | Indicator, table: DemonstrationTable, rows: slice) -> FloatArray:
+    """What a column asks of some rows, in double precision: a number, or 1 for yes; (rows,)."""
+    states = table.states[rows].T
     if isinstance(asked, Number):
-        return StateTests(table.features).reading(asked.quantity)(table.states.T)
+        return StateTests(table.features).reading(asked.quantity)(states)
     condition = asked.condition
     if isinstance(condition, PreviousActionIs | LastActionIs):
-        holds = history_columns(table.actions, table.previous, table.last)(condition)
+        holds = history_columns(table.actions, table.previous[rows], table.last[rows])(condition)
     else:
-        holds = StateTests(table.features).of(condition)(table.states.T)
+        holds = StateTests(table.features).of(condition)(states)
     return np.asarray(holds, dtype=np.float64)
 
 

@@ -83,6 +83,14 @@ class PruningPath:
         first = np.searchsorted(levels, self.collapse, side="left")
         return first, np.where(self.parents < 0, len(levels), first[self.parents])
 
+    def passed(self, reached: IntArray) -> IntArray:
+        """The rows that pass through each node, where so many end at it: (nodes, actions)."""
+        passed = reached.copy()
+        # Rows that reach a node reach its parent; parents come before their children.
+        for node in range(len(passed) - 1, 0, -1):
+            passed[self.parents[node]] += passed[node]
+        return passed
+
     def standing(self, is_leaf: BoolArray) -> IntArray:
         """For each node, itself or the topmost of the given leaves above it, shape (nodes,)."""
         standing = np.arange(len(is_leaf))

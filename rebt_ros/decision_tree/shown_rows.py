@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.behavior_tree.shown import (
     MOST_SHOWN_LEAVES,
     ShownChannel,
@@ -12,7 +12,7 @@ from rebt_ros.behavior_tree.shown import (
     ShownValues,
     Span,
 )
-from rebt_ros.decision_tree.fitted import TrainedTree
+from rebt_ros.decision_tree.fitted import TrainedTree, in_parts
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 
@@ -33,22 +33,27 @@ def shown_rows(table: DemonstrationTable, trained: TrainedTree) -> ShownChannel:
     """
     compared = sum(not feature.lag for feature in table.features)
     most = min(MOST_SHOWN_LEAVES, max(_MOST_RANGES // max(compared, 1), 1))
+    leaf_of_row = trained.leaves(table)
     # scikit-learn numbers nodes from left to right, so that neighbours have neighbouring numbers.
-    leaves, leaf_of_row = np.unique(trained.leaves(table), return_inverse=True)
-    group_of_row = _groups(len(leaves), most)[leaf_of_row]
-    order = np.argsort(group_of_row, kind="stable")
-    starts = np.flatnonzero(np.diff(group_of_row[order], prepend=-1))
-    # Feature by feature, so that a large table is not held a second time.
-    columns = [
-        _values(feature, table.states[:, place], order, starts)
-        for place, feature in enumerate(table.features)
-    ]
-    rows = np.diff(starts, append=len(table)).tolist()
+    reached = np.bincount(leaf_of_row, minlength=len(trained.grown))
+    leaves = np.flatnonzero(reached)
+    group_of_leaf = np.zeros(len(reached), dtype=np.int64)
+    group_of_leaf[leaves] = _groups(len(leaves), most)
+    rows = np.bincount(group_of_leaf[leaves], weights=reached[leaves]).astype(np.int64)
+    columns = [_Values(feature, len(rows)) for feature in table.features]
+    for part in in_parts(table):
+        group_of_row = group_of_leaf[leaf_of_row[part]]
+        order = np.argsort(group_of_row, kind="stable")
+        starts = np.flatnonzero(np.diff(group_of_row[order], prepend=-1))
+        groups, states = group_of_row[order[starts]], table.states[part]
+        for place, values in enumerate(columns):
+            values.add(states[:, place][order], groups, starts)
+    shown = [values.shown() for values in columns]
     return ShownChannel(
         table.channel,
         tuple(
-            ShownLeaf(count, tuple(values[group] for values in columns))
-            for group, count in enumerate(rows)
+            ShownLeaf(count, tuple(values[group] for values in shown))
+            for group, count in enumerate(rows.tolist())
         ),
     )
 
@@ -59,31 +64,49 @@ def _groups(leaves: int, most: int) -> IntArray:
     return np.arange(leaves) * count // max(leaves, 1)
 
 
-def _values(
-    feature: Feature, column: FloatArray, order: IntArray, starts: IntArray
-) -> list[ShownValues]:
-    """What a feature was in the rows of each group.
+class _Values:
+    """What a feature was in the rows of each group, gathered from one part of a table to the next.
 
     Args:
         feature: The feature.
-        column: Its values, shape (rows,).
-        order: Positions of the rows, group after group.
-        starts: Where each group begins in `order`.
+        groups: How many there are.
     """
-    if feature.lag:
-        return [None] * len(starts)
-    ordered = column[order]
-    if feature.kind is FeatureKind.CATEGORICAL:
-        return [_categories(feature, part) for part in np.split(ordered, starts[1:])]
-    # These leave out what is missing, unless all is.
-    low, high = np.fmin.reduceat(ordered, starts), np.fmax.reduceat(ordered, starts)
-    return [
-        None if np.isnan(least) else Span(least, most)
-        for least, most in zip(low.tolist(), high.tolist(), strict=True)
-    ]
 
+    def __init__(self, feature: Feature, groups: int) -> None:
+        self._feature = feature
+        self._low, self._high = np.full((2, groups), np.nan)
+        self._occurs = np.zeros((groups, len(feature.categories)), dtype=bool)
 
-def _categories(feature: Feature, column: FloatArray) -> ShownValues:
-    known = column[~np.isnan(column)]
-    codes = np.unique(known).astype(np.int64).tolist()
-    return tuple(feature.categories[code] for code in codes) if codes else None
+    def add(self, column: FloatArray, groups: IntArray, starts: IntArray) -> None:
+        """Takes the values of some rows.
+
+        Args:
+            column: Group after group, shape (rows,).
+            groups: Those that have rows.
+            starts: Where each of them begins.
+        """
+        if self._feature.lag:
+            return
+        if self._feature.kind is FeatureKind.CATEGORICAL:
+            of_row = np.repeat(groups, np.diff(starts, append=len(column)))
+            known = ~np.isnan(column)
+            self._occurs[of_row[known], column[known].astype(np.int64)] = True
+            return
+        # These leave out what is missing, unless all is.
+        self._low[groups] = np.fmin(self._low[groups], np.fmin.reduceat(column, starts))
+        self._high[groups] = np.fmax(self._high[groups], np.fmax.reduceat(column, starts))
+
+    def shown(self) -> list[ShownValues]:
+        """What there was, group by group."""
+        if self._feature.lag:
+            return [None] * len(self._low)
+        if self._feature.kind is FeatureKind.CATEGORICAL:
+            return [self._categories(occurs) for occurs in self._occurs]
+        return [
+            None if np.isnan(least) else Span(least, most)
+            for least, most in zip(self._low.tolist(), self._high.tolist(), strict=True)
+        ]
+
+    def _categories(self, occurs: BoolArray) -> ShownValues:
+        codes = np.flatnonzero(occurs).tolist()
+        return tuple(self._feature.categories[code] for code in codes) or None

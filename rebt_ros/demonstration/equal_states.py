@@ -10,6 +10,9 @@ from rebt_ros.arrays import FloatArray, IntArray
 #: Odd numbers that stir hashes of states.
 _GOLDEN, _ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD6E8FEB86659FD93)
 
+#: Rows that are looked at at a time.
+_ROWS_AT_A_TIME = 65_536
+
 
 def codes_of_states(states: FloatArray) -> IntArray:
     """A number for each row, equal for equal states, shape (rows,).
@@ -20,12 +23,14 @@ def codes_of_states(states: FloatArray) -> IntArray:
         states: Shape (rows, features).
     """
     hashes = np.zeros(len(states), dtype=np.uint64)
-    # Column by column, so that a large table is not held a second time.
-    for column in states.T:
-        # 0 has two signs, and NaN many forms.
-        values = np.where(np.isnan(column), np.nan, column) + 0.0
-        hashes = _mixed(hashes + _GOLDEN) ^ _mixed(values.view(np.uint64))
-        hashes *= _ODD
+    # In parts, as a large table may be on disk, where going through it once takes long enough.
+    for start in range(0, len(states), _ROWS_AT_A_TIME):
+        part = hashes[start : start + _ROWS_AT_A_TIME]
+        for column in states[start : start + len(part)].T:
+            # 0 has two signs, and NaN many forms.
+            values = np.where(np.isnan(column), np.nan, column) + 0.0
+            part[:] = _mixed(part + _GOLDEN) ^ _mixed(values.view(np.uint64))
+            part *= _ODD
     return np.unique(hashes, return_inverse=True)[1].astype(np.int64)
 
 

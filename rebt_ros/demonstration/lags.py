@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rebt_ros.demonstration.large_arrays import roomy
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 
@@ -37,13 +38,15 @@ def with_lags(table: DemonstrationTable, lags: int) -> DemonstrationTable:
         return table
     # Position in its demonstration; a demonstration's rows stand together.
     row = np.arange(len(table)) - np.searchsorted(table.demonstration, table.demonstration)
-    blocks = [table.states]
+    width = len(table.features)
+    states = roomy((len(table), width * (1 + lags)))
+    states[:, :width] = table.states
     for lag in range(1, lags + 1):
-        earlier = np.roll(table.states, lag, axis=0)
+        earlier = states[:, lag * width : (lag + 1) * width]
+        earlier[lag:] = table.states[:-lag]
         earlier[row < lag] = np.nan
-        blocks.append(earlier)
     features = (*table.features, *_lagged(table.features, lags))
-    return replace(table, features=features, states=np.hstack(blocks))
+    return replace(table, features=features, states=states)
 
 
 def evenly_spaced(table: DemonstrationTable) -> bool:

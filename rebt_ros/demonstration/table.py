@@ -11,6 +11,7 @@ import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
+from rebt_ros.demonstration.large_arrays import roomy, rows_of
 from rebt_ros.demonstration.last_action import (
     NO_ACTION,
     ActionHistory,
@@ -96,7 +97,7 @@ class DemonstrationTable:
         part = _stretch(rows)
         return replace(
             self,
-            states=self.states[part],
+            states=self.states[part] if isinstance(part, slice) else rows_of(self.states, part),
             chosen=self.chosen[part],
             demonstration=self.demonstration[part],
             stamps=self.stamps[part],
@@ -255,7 +256,7 @@ def _channel_table(
         channel,
         features,
         # The only copy is the one that was made when states were joined.
-        states if everywhere.all() else states[everywhere],
+        states if everywhere.all() else rows_of(states, everywhere),
         actions,
         chosen,
         tuple(demonstration.name for demonstration in demonstrations),
@@ -327,7 +328,11 @@ def _joined_states(
     features = tuple(
         _unified(*_telling(place, demonstrations)) for place in range(len(first.features))
     )
-    states = np.concatenate([demonstration.states for demonstration in demonstrations])
+    rows = sum(map(len, demonstrations))
+    states = np.concatenate(
+        [demonstration.states for demonstration in demonstrations],
+        out=roomy((rows, len(features))),
+    )
     end = 0
     for demonstration in demonstrations:
         start, end = end, end + len(demonstration)

@@ -40,6 +40,7 @@ from rebt_ros.learning.cross_validation import MOST_FOLDS, CrossValidation
 from rebt_ros.learning.fitting import fit_options
 from rebt_ros.learning.judged_levels import JudgedLevels, clearly_raised
 from rebt_ros.learning.options import LearnOptions, Use
+from rebt_ros.learning.structure import structure_sample
 from rebt_ros.logic.conditions import Difference
 from rebt_ros.paper.rules import delta_close
 
@@ -211,6 +212,7 @@ class _Choice:
         self._held_out = held_out
         self.shown = table if held_out is None else table.where(~held_out)
         """The rows to choose by."""
+        self._sample = structure_sample(table, options)
         large = len(self.shown) > _LARGE
         self._telling = part_of(self.shown, _ROWS_THAT_TELL) if large else self.shown
         self._made: dict[tuple[bool, Vocabulary], CrossValidation] = {}
@@ -226,6 +228,7 @@ class _Choice:
                 fit_options(self._options, vocabulary),
                 step=self._step,
                 held_out=None if telling else self._held_out,
+                grown_on=None if telling or self._sample is None else self._sample.rows,
             )
         return self._made[key]
 

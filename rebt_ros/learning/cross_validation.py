@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.decision_tree.counting import fit_parts_by_sample
 from rebt_ros.decision_tree.fitted import FittedTree, TrainedTree
 from rebt_ros.decision_tree.training import PLAIN, FitOptions, fit_parts
 from rebt_ros.demonstration.last_action import History
@@ -46,6 +47,7 @@ class CrossValidation:
         options: How the trees are fitted; none is judged on rows that were made up.
         step: Called after each tree that was fitted, and each fold in which trees were run.
         held_out: Rows that are in no fold, and that no fold's tree is fitted to, shape (rows,).
+        grown_on: The rows that splits are chosen by, shape (rows,); None for all.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class CrossValidation:
         *,
         step: Callable[[], None] = lambda: None,
         held_out: BoolArray | None = None,
+        grown_on: BoolArray | None = None,
     ) -> None:
         self._step = step
         self._actions = len(table.actions)
@@ -64,13 +67,14 @@ class CrossValidation:
         numbers = np.unique(fold[inside])
         trees: list[FittedTree] = []
         # The largest first, so that no core waits for the last one.
-        for tree in fit_parts(
-            table,
-            [
-                *([] if held_out is None else [inside]),
-                *(inside & (fold != number) for number in numbers),
-            ],
-            options,
+        parts = [
+            *([] if held_out is None else [inside]),
+            *(inside & (fold != number) for number in numbers),
+        ]
+        for tree in (
+            fit_parts(table, parts, options)
+            if grown_on is None
+            else fit_parts_by_sample(table, parts, grown_on, options)
         ):
             trees.append(tree)
             step()

@@ -39,6 +39,9 @@ _NOT_LEARNED = Provenance(
     0, 0, 0.0, None, 0.0, Root.SELECTOR, History.NONE, Figures(0, None, None, 0)
 )
 
+#: Rows that a decision tree is run over at a time, with whatever was done before them.
+_ROWS_AT_A_TIME = 65_536
+
 #: Conditions that are told apart by one number each; with more, the kinds are counted anew.
 _MOST_BITS = 30
 
@@ -162,18 +165,23 @@ def decision_tree_choices(
             raise ValueError("LAT depends on the rule that asks, which a decision tree has none of")
     # What is chosen after each action, and in the last line after none.
     befores = [*range(len(table.actions)), NO_ACTION]
-    choices = [
-        predict(replace(table, previous=np.full(len(table), before))).tolist() for before in befores
-    ]
-    chosen: list[int] = []
+    chosen = np.empty(len(table), dtype=np.int64)
     starts = _starts(table)
     choice = NO_ACTION
-    for row, (starting, before) in enumerate(
-        zip(starts.tolist(), table.previous.tolist(), strict=True)
-    ):
-        choice = choices[before if starting else choice][row]
-        chosen.append(choice)
-    return np.array(chosen, dtype=np.int64)
+    for start in range(0, len(table), _ROWS_AT_A_TIME):
+        inside = np.zeros(len(table), dtype=bool)
+        inside[start : start + _ROWS_AT_A_TIME] = True
+        rows = table.where(inside)
+        choices = [
+            predict(replace(rows, previous=np.full(len(rows), before))).tolist()
+            for before in befores
+        ]
+        for row, (starting, before) in enumerate(
+            zip(starts[inside].tolist(), rows.previous.tolist(), strict=True)
+        ):
+            choice = choices[before if starting else choice][row]
+            chosen[start + row] = choice
+    return chosen
 
 
 def agreement(chosen: IntArray, table: DemonstrationTable) -> float | None:

@@ -15,6 +15,8 @@ from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.levels import Evidence, Levels
 from rebt_ros.learning.options import ALL, LearnOptions, PsaChoice
 from rebt_ros.learning.report import LearningReport, report_on
+from rebt_ros.learning.sample_report import report_on_sample
+from rebt_ros.learning.structure import structure_sample
 from rebt_ros.verification.explaining import Explanation, explain
 
 
@@ -184,12 +186,15 @@ def learned_as_asked(
     """
     options = evidence.options
     tree, suggestions = accept(plain.tree, plain.suggestions, options)
+    table = evidence.learned_from
+    sample = structure_sample(table, options)
     report = report_on(
-        evidence.learned_from,
+        table,
         tree,
         decision_tree.vocabulary.history,
         policy.levels,
         policy.ccp_alpha,
+        None if sample is None else report_on_sample(sample, table, decision_tree),
     )
     return Learning(
         replace(plain, tree=tree, suggestions=suggestions),

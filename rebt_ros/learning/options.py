@@ -100,6 +100,9 @@ class LearnOptions:
     """Rows that decision trees are fitted to beside those shown; none is ever judged on them."""
     attach: tuple[str, ...] = ()
     """Ids of the suggestions to attach, or `ALL`."""
+    exact: bool = False
+    """Whether the structure of trees is grown on all rows, also where there are more than 100,000:
+    otherwise on a sample of whole demonstrations (see `structure`)."""
     routines: bool = True
     """Whether Sequences and Repeaters are looked for in rows that share one state."""
     psa_choice: PsaChoice | None = None
@@ -212,6 +215,7 @@ class LearnOptions:
             readable_thresholds=False,
             leave_out_mistakes=False,
             reaction_time=0.0,
+            exact=True,
             routines=False,
         )
 
@@ -228,7 +232,7 @@ _ENUMS: Mapping[str, type[Enum]] = {
 #: Options that are numbers, and those that say yes or no.
 _NUMBERS = ("delta", "ccp_alpha", "test_fraction", "reaction_time")
 _WHOLE_NUMBERS = ("max_depth", "level", "random_state", "lags")
-_SWITCHES = ("refit", "simplest", "readable_thresholds", "leave_out_mistakes", "routines")
+_SWITCHES = ("refit", "simplest", "readable_thresholds", "leave_out_mistakes", "exact", "routines")
 #: Numbers that may be None.
 _LEFT_OPEN = frozenset({"ccp_alpha", "reaction_time", "max_depth", "level"})
 #: Those that are None where nobody chose.

@@ -21,6 +21,7 @@ from rebt_ros.demonstration.equal_states import codes_of_states
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning.judged_levels import JudgedLevels
+from rebt_ros.learning.sample_report import SampleReport
 
 #: How well agreement in cross-validation ranks the trees of one task by their success (Spearman's
 #: rho): 0.6 where trees of the same demonstrations were compared, 0.2 over sets and numbers of
@@ -65,6 +66,8 @@ class LearningReport:
     rows: int
     weighted: bool = False
     """Whether demonstrations have weights, by which rows count in cross-validation."""
+    sample: SampleReport | None = None
+    """What the structure of the tree was grown on; None for all rows."""
 
     def notes(self) -> Iterator[str]:
         """What should make a person look twice; no full stops."""
@@ -109,6 +112,8 @@ class LearningReport:
                 f"Forecast: {self.agreement:.1%} agreement in cross-validation ({FORECAST}), where "
                 f"{simplest}; mean recall {self.mean_recall:.1%}: {_listed(recalls)}."
             )
+        if self.sample is not None:
+            said = f"{self.sample.sentence} {said}"
         never = [repr(one.label) for one in self.actions if not one.taken]
         return f"{said} Never taken: {_listed(never)}." if never else said
 
@@ -124,6 +129,7 @@ class LearningReport:
             "weighted": self.weighted,
             "conflicting_rows": self.conflicts,
             "conflicting_rows_after_history": self.conflicts_after_history,
+            "sample": None if self.sample is None else self.sample.as_json(),
         }
 
     def figures(self) -> Mapping[str, str]:
@@ -145,6 +151,7 @@ def report_on(
     history: History,
     levels: JudgedLevels | None,
     ccp_alpha: float,
+    sample: SampleReport | None = None,
 ) -> LearningReport:
     """Reports on a policy.
 
@@ -154,6 +161,7 @@ def report_on(
         history: What it may test of what was done before.
         levels: The pruning levels in cross-validation, if there was one.
         ccp_alpha: The level that was chosen.
+        sample: What the structure of the tree was grown on; None for all rows.
     """
     shown = np.bincount(table.chosen, minlength=len(table.actions))
     weighed = table.counts(table.chosen, len(table.actions))
@@ -182,6 +190,7 @@ def report_on(
         after_history,
         len(table),
         table.weights is not None,
+        sample,
     )
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
+from rebt_ros.demonstration.large_arrays import Spool
+from rebt_ros.storage.read import Read, on_spool
 from rebt_ros.storage.text import unreadable
-
-if TYPE_CHECKING:
-    from rebt_ros.storage.read import Read
 
 #: What changes where somebody writes to a file: its number, size and times (nanoseconds).
 _State: TypeAlias = tuple[int, int, int, int]
@@ -25,6 +24,7 @@ class KeptRecordings:
 
     def __init__(self, read: Callable[[Path], Read]) -> None:
         self._read = read
+        self._spool = Spool()
         self._kept: dict[Path, tuple[_State, Read]] = {}
 
     def read(
@@ -54,7 +54,7 @@ class KeptRecordings:
         new = [path for path in states if path not in kept]
         for done, path in enumerate(new, start=1):
             # Of a recording that grows meanwhile, the state is one that it is not in any more.
-            kept[path] = states[path], self._read(path)
+            kept[path] = states[path], on_spool(self._read(path), self._spool)
             tell(done / len(new))
         return [kept[path][1] for path in paths]
 

@@ -105,6 +105,9 @@ def learn(
         for table in tabulate(loaded.demonstrations, declared, loaded.weights)
     )
     asked = rules_for(given, loaded.robot)
+    if asked is None:
+        # The tables have all of it: nobody asks for a large one twice.
+        loaded = replace(loaded, demonstrations=())
     learning = _part(progress, 0.0, _LEARNING_SHARE) if levels else progress
     for table in tables:
         _refuse_what_are_no_actions(table)

@@ -61,6 +61,7 @@ def write_summary(
         "upsample": options.upsample.value,
         "test_fraction": options.test_fraction,
         "refit": options.refit,
+        "exact": options.exact,
         "lags": options.lags,
         "versions": _versions(options),
     }

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from rebt_ros.demonstration.large_arrays import Spool
 from rebt_ros.errors import InputError, OptionError, RebtError
 from rebt_ros.storage.column_file import NoColumnFileError, unpacked_read
 from rebt_ros.storage.input_options import InputKind, InputOptions, ReadingPlan, Source
-from rebt_ros.storage.read import Read
+from rebt_ros.storage.read import Read, on_spool
 from rebt_ros.storage.read_cache import (
     ReadCache,
     is_kept,
@@ -79,12 +80,13 @@ def gather(sources: Sequence[Source], reading: Reading, options: InputOptions) -
     keys = {}
     if cache is not None and plan.scheduler is None:
         keys = {place: _key(source, reading, options) for place, source in enumerate(sources)}
+    spool = Spool()
     answers: dict[int, Read | RebtError] = {}
     if cache is not None:
         for place, key in keys.items():
             read = cache.get(key, sources[place], options.robot) if key else None
             if read is not None:
-                answers[place] = read
+                answers[place] = on_spool(read, spool)
     missing = [place for place in range(len(sources)) if place not in answers]
     apart = _for_workers(missing, sources, plan)
     tell = _Telling(plan.progress, len(missing))
@@ -92,10 +94,12 @@ def gather(sources: Sequence[Source], reading: Reading, options: InputOptions) -
     try:
         for place in (one for one in missing if one not in apart):
             source, known = sources[place], keys.get(place)
-            answers[place] = _answer(source, reading, options, known, cache, reasons)
+            answer = _answer(source, reading, options, known, cache, reasons)
+            answers[place] = on_spool(answer, spool) if isinstance(answer, Read) else answer
             tell.one_more()
         for fetched in _by_workers(sorted(apart), sources, keys, reading, options):
-            answers[fetched.place] = _taken(fetched, sources[fetched.place], options)
+            answer = _taken(fetched, sources[fetched.place], options)
+            answers[fetched.place] = on_spool(answer, spool) if isinstance(answer, Read) else answer
             reasons += filter(None, [fetched.unwritable])
             tell.one_more()
     finally:

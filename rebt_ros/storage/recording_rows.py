@@ -33,6 +33,7 @@ from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.demonstration.builder import LARGEST_VALUE, is_label
 from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.demonstration import Demonstration, Row, in_sorted_order
+from rebt_ros.demonstration.large_arrays import roomy
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError
 from rebt_ros.storage.account import Account
@@ -209,7 +210,7 @@ class _Columns:
     def __init__(self, path: Path, head: Head, room: int) -> None:
         self._path = path
         self._head = head
-        self._states = np.empty((room, len(head.features)))
+        self._states = roomy((room, len(head.features)))
         self._stamps, self._actions, self._channel = np.empty((3, room), dtype=np.int64)
         self._rows = 0
         self._labels: list[bytearray] = []

@@ -14,6 +14,8 @@ Word = tuple[int, ...]
 
 #: Moments that are looked at; of more, as many are taken from all over the demonstrations.
 _MOST_MOMENTS = 25_000
+#: Rows that are compared at a time: a large table is not held a second time.
+_ROWS_AT_A_TIME = 65_536
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -55,21 +57,22 @@ def moments(table: DemonstrationTable) -> Moments:
         if not now:
             # Without a state there is but the time to tell moments apart.
             alike &= np.diff(table.stamps) == 0
-        # One by one, as large tables fill the memory.
-        for column in now:
-            after, before = table.states[1:, column], table.states[:-1, column]
-            alike &= (after == before) | (np.isnan(after) & np.isnan(before))
+        for start in range(0, len(alike), _ROWS_AT_A_TIME):
+            part = alike[start : start + _ROWS_AT_A_TIME]
+            states = table.states[start : start + len(part) + 1]
+            for column in now:
+                after, before = states[1:, column], states[:-1, column]
+                part &= (after == before) | (np.isnan(after) & np.isnan(before))
         begins[1:] = ~alike
     first = np.flatnonzero(begins)
     last = np.append(first[1:], len(table))
     if len(first) > _MOST_MOMENTS:
         taken = np.linspace(0, len(first) - 1, _MOST_MOMENTS).astype(np.int64)
         first, last = first[taken], last[taken]
-    chosen = table.chosen.tolist()
     counts: dict[Word, int] = {}
     found = []
     for begin, end in zip(first.tolist(), last.tolist(), strict=True):
-        word = tuple(chosen[begin:end])
+        word = tuple(table.chosen[begin:end].tolist())
         counts[word] = counts.get(word, 0) + 1
         found.append(word)
     words = sorted(counts, key=lambda word: (-len(word) * counts[word], word))

@@ -306,6 +306,12 @@ def _rows(declare: Parameters) -> dict[str, Callable[[], object]]:
         "refit": declare.flag(
             "refit", True, "Whether to learn from all rows once it is judged.", fixed=False
         ),
+        "exact": declare.flag(
+            "exact",
+            False,
+            "Whether trees grow on all rows where there are more than 100000, not on a sample.",
+            fixed=False,
+        ),
         "lags": declare.integer(
             "lags",
             0,

@@ -1,0 +1,99 @@
+"""What a tree whose structure was grown on a sample says of the sample, and of all rows."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from rebt_ros.arrays import IntArray
+from rebt_ros.decision_tree.fitted import TrainedTree
+from rebt_ros.demonstration.sampling import Sample
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.learning.evaluation import mean_recall
+
+#: So many actions are listed in a sentence.
+_LISTED = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How well a decision tree agrees with rows that it was learned from, by their weights."""
+
+    agreement: float
+    mean_recall: float
+    """Over the actions."""
+
+
+@dataclass(frozen=True, slots=True)
+class SampleReport:
+    """What the structure of a tree was grown on, beside all rows that it was learned from."""
+
+    rows: int
+    of_rows: int
+    demonstrations: int
+    of_demonstrations: int
+    complete: tuple[str, ...]
+    """Actions of which no row is left out."""
+    sampled: Fit
+    """The tree on the rows of the sample."""
+    whole: Fit
+    """The tree on all rows."""
+
+    @property
+    def sentence(self) -> str:
+        """All of it, for people."""
+        named = ", ".join(map(repr, self.complete[:_LISTED]))
+        more = ", ..." if len(self.complete) > _LISTED else ""
+        complete = f", all that show {named}{more} among them" if self.complete else ""
+        return (
+            f"The tree was grown on a sample of {self.rows} of {self.of_rows} rows "
+            f"({self.demonstrations} of {self.of_demonstrations} demonstrations{complete}), and "
+            f"pruned, chosen and counted by all: it agrees with {self.sampled.agreement:.1%} of "
+            f"the sample and {self.whole.agreement:.1%} of all rows (mean recall "
+            f"{self.sampled.mean_recall:.1%} and {self.whole.mean_recall:.1%})."
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """For summary.json."""
+        return asdict(self) | {"complete": list(self.complete)}
+
+
+def report_on_sample(
+    sample: Sample, table: DemonstrationTable, trained: TrainedTree
+) -> SampleReport:
+    """Reports on a sample.
+
+    Args:
+        sample: Of the table.
+        table: What the tree was learned from.
+        trained: The tree.
+    """
+    rows = table.where(sample.rows)
+    actions = len(table.actions)
+    right = trained.predict(rows) == rows.chosen
+    hits = rows.counts(rows.chosen[right], actions, right)
+    return SampleReport(
+        len(rows),
+        len(table),
+        sample.demonstrations,
+        len(np.unique(table.demonstration)),
+        sample.complete,
+        _fit(hits, rows.counts(rows.chosen, actions)),
+        _fit(_counted_hits(trained), trained.grown.counts[0]),
+    )
+
+
+def _counted_hits(trained: TrainedTree) -> IntArray:
+    """The rows of each action that the tree predicts, of those it counts, shape (actions,)."""
+    grown = trained.grown
+    leaves = np.unique(trained.standing[grown.left < 0])
+    majority = grown.majority[leaves]
+    hits = np.zeros(grown.counts.shape[1], dtype=np.int64)
+    np.add.at(hits, majority, grown.counts[leaves, majority])
+    return hits
+
+
+def _fit(hits: IntArray, shown: IntArray) -> Fit:
+    return Fit(float(hits.sum() / shown.sum()), float(mean_recall(hits, shown)))
