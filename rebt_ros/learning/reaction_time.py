@@ -14,17 +14,23 @@ the states that they belong to differ.
 A tree that may test the previous action leans on it, as actions are held, and then hardly sees a
 delay; one that may not cannot explain a task that needs memory.  So both are asked (see
 `estimate`).
+
+Few demonstrations have few changes of action, so that explanations differ by one or two leaves and
+exceptions.  Then it tells more how many bits they take (see `shortest_description`): who goes when
+a bell has rung is described by one test of the bell, and who goes two rows later by a position for
+each demonstration.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rebt_ros.arrays import IntArray
+from rebt_ros.decision_tree.description_length import Description, shortest_description
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.training import FitOptions, fit
@@ -59,6 +65,10 @@ _MUCH_SIMPLER = 1 / 3
 _BEGUN_AND_HELD = 2
 #: The explanation must be smaller by that many standard errors, and by that share.
 _STANDARD_ERRORS, _SHARE = 1.0, 0.1
+#: A description must be shorter by so many bits: by chance, one of a thousand is.
+_BITS = 10.0
+#: Descriptions whose lengths differ by no more bits are equally good; then the delay is short.
+_EQUAL_BITS = 4.0
 #: What takes a leaf or an exception for more than this share of the rows explains nothing.
 _LARGEST = 1 / 3
 
@@ -67,10 +77,11 @@ _WITH_PREVIOUS = Vocabulary(history=History.PREVIOUS)
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """How large the explanation is if the demonstrator was late by so many rows."""
+    """How long the explanation is if the demonstrator was late by so many rows."""
 
     rows: int
-    size: int
+    size: float
+    """Leaves and exceptions; or bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +98,8 @@ class ReactionTime:
     """What decided, by ascending delay; empty where nothing could be compared."""
     by_states_alone: bool = True
     """Whether these are explanations by states alone; else the previous action is tested, too."""
+    in_bits: bool = False
+    """Whether sizes are in bits, instead of leaves and exceptions."""
 
 
 def given(table: DemonstrationTable, seconds: float) -> ReactionTime:
@@ -119,7 +132,10 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
 
     A delay is clear if its explanation is not larger than a third of the rows, and smaller than the
     one without a delay by a tenth and by a standard error, where sizes are counts: of a and b, the
-    standard error is the root of a + b.
+    standard error is the root of a + b.  Where none is clear, it takes the delay with the shortest
+    description by states and previous actions, if that is clear: less than half of the time for
+    which actions are held, and shorter than without a delay by ten bits, a tenth, and a standard
+    error of the exceptions.
 
     Args:
         table: Samples of one channel, in whole demonstrations.
@@ -133,7 +149,12 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
         return ReactionTime(0, _seconds(0, gap), why_not)
     explanations = _Explanations(table, most)
     trials, by_states_alone = explanations.trials()
-    rows = _clear(trials, len(explanations))
+    rows, in_bits = _clear(trials, len(explanations)), False
+    if not rows and len(trials) > 1:
+        rows, described = explanations.described()
+        in_bits = rows > 0
+        if in_bits:
+            trials, by_states_alone = described, False
     sentence = _NOT_LATE
     if rows:
         seconds = _seconds(rows, gap)
@@ -142,7 +163,7 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
         sentence = (
             f"the demonstrator acted {late} late; actions are learned as of when they were due"
         )
-    return ReactionTime(rows, _seconds(rows, gap), sentence, trials, by_states_alone)
+    return ReactionTime(rows, _seconds(rows, gap), sentence, trials, by_states_alone, in_bits)
 
 
 _NOT_LATE = "no reaction time shows: actions are learned as of when they were taken"
@@ -177,10 +198,37 @@ class _Explanations:
         place, _ = places(table)
         # Rows whose state and previous action are known whatever the delay is.
         self._rows = _stretches(np.flatnonzero(place >= most))
+        self._trees: dict[tuple[int, Vocabulary], FittedTree] = {}
 
     def __len__(self) -> int:
         """Rows that are explained."""
         return len(self._rows)
+
+    def described(self) -> tuple[int, tuple[Trial, ...]]:
+        """The delay at which states and previous actions describe the rows clearly best, or 0.
+
+        And the bits that descriptions take, by ascending delay.
+        """
+        made: dict[int, Description] = {}
+
+        def bits(delay: int) -> float:
+            made[delay] = shortest_description(self._fitted(delay, _WITH_PREVIOUS))
+            return made[delay].bits
+
+        trials = self._around(Trial(0, bits(0)), bits)
+        best = _shortest(trials)
+        before, after = made[0], made[best.rows]
+        wrong = math.sqrt(before.exceptions + after.exceptions)
+        least = max(_BITS, _SHARE * before.bits, _STANDARD_ERRORS * wrong * before.exception_bits)
+        named_one_by_one = len(self) * math.log2(len(np.unique(self._table.chosen[self._rows])))
+        clear = (
+            before.bits - after.bits >= least
+            and after.bits <= _LARGEST * named_one_by_one
+            and best.rows < _HALF_A_RUN * _usual_run(self._table)
+            # Where the longest delay is clearly better, descriptions may go on to become shorter.
+            and trials[-1].size >= best.size - _BITS
+        )
+        return best.rows if clear else 0, trials
 
     def trials(self) -> tuple[tuple[Trial, ...], bool]:
         """What decides, by ascending delay, and whether it is about states alone."""
@@ -192,7 +240,7 @@ class _Explanations:
         for one in (alone, with_previous):
             if one.size == least:
                 return (one,), one is alone
-        trials = self._around(alone, FEATURES_ALONE)
+        trials = self._around(alone, lambda delay: self._size(delay, FEATURES_ALONE))
         best = _peak(trials)
         half_a_run = _HALF_A_RUN * _usual_run(self._table)
         held = without_delay.explaining_leaves <= _BEGUN_AND_HELD * least
@@ -200,7 +248,7 @@ class _Explanations:
         tells = best.rows < half_a_run and best.size <= _ALONE * with_previous.size
         if tells and not (_clear(trials, len(self)) and needs_memory):
             return trials, True
-        trials = self._around(with_previous, _WITH_PREVIOUS)
+        trials = self._around(with_previous, lambda delay: self._size(delay, _WITH_PREVIOUS))
         much_simpler = _peak(trials).size <= _MUCH_SIMPLER * with_previous.size
         if with_previous.size <= _MUCH_SIMPLER * alone.size and not much_simpler:
             # Half a way late, a task that needs memory seems to need none, and mistakes weigh less:
@@ -208,14 +256,14 @@ class _Explanations:
             trials = tuple(one for one in trials if one.rows < half_a_run)
         return trials, False
 
-    def _around(self, without: Trial, vocabulary: Vocabulary) -> tuple[Trial, ...]:
+    def _around(self, without: Trial, size: Callable[[int], float]) -> tuple[Trial, ...]:
         """Delays from all over the range, then closer and closer ones around the best."""
         step = math.ceil(self._most / _FIRST_TRIALS)
         delays = set(range(step, self._most + 1, step))
         made = {0: without}
         while True:
             for delay in sorted(delays - set(made)):
-                made[delay] = Trial(delay, self._size(delay, vocabulary))
+                made[delay] = Trial(delay, size(delay))
             trials = tuple(made[delay] for delay in sorted(made))
             if step == 1:
                 return trials
@@ -227,6 +275,11 @@ class _Explanations:
         return self._fitted(delay, vocabulary).explanation
 
     def _fitted(self, delay: int, vocabulary: Vocabulary) -> FittedTree:
+        if (delay, vocabulary) not in self._trees:
+            self._trees[delay, vocabulary] = self._fit(delay, vocabulary)
+        return self._trees[delay, vocabulary]
+
+    def _fit(self, delay: int, vocabulary: Vocabulary) -> FittedTree:
         table, rows = self._table, self._rows
         late = replace(
             table,
@@ -275,3 +328,16 @@ def _peak(trials: Sequence[Trial]) -> Trial:
         last += 1
     ends = last + 1 == len(sizes)
     return trials[first if ends else (first + last) // 2]
+
+
+def _shortest(trials: Sequence[Trial]) -> Trial:
+    """The delay with the shortest description, of all but the longest delay.
+
+    Of such that are equally good it is the first, or the second of three or more: a border that is
+    passed at one speed is still one a row too early or too late.
+    """
+    sizes = [trial.size for trial in trials]
+    equal = min(sizes[:-1]) + _EQUAL_BITS
+    first = next(place for place, size in enumerate(sizes) if size <= equal)
+    three = first and first + 3 < len(sizes) and max(sizes[first + 1 : first + 3]) <= equal
+    return trials[first + 1 if three else first]

@@ -21,7 +21,7 @@ from rebt_ros.demonstration.last_action import (
     last_actions,
     previous_actions,
 )
-from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
 from rebt_ros.learning import reaction_time
@@ -385,6 +385,36 @@ def fits(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     monkeypatch.setattr(reaction_time, "fit", counted)
     return rows
+
+
+def visits(late: int, seed: int) -> tuple[list[list[float]], list[int]]:
+    """Waits somewhere until a bell has rung for one step, then goes: this needs memory."""
+    chance = random.Random(seed)
+    x, rings, going = chance.uniform(2, 8), chance.randrange(12, 25), False
+    position: list[list[float]] = []
+
+    def decide() -> Iterator[int]:
+        nonlocal going
+        while True:
+            going = going or position[-1][1] > 0
+            yield RIGHT if going else STAY
+
+    act = acted_late(decide(), late)
+    actions: list[int] = []
+    for step in range(rings + 20):
+        position.append([x, float(step == rings)])
+        actions.append(act())
+        x += chance.uniform(0.4, 0.6) * (actions[-1] == RIGHT)
+    return position, actions
+
+
+@pytest.mark.parametrize("late", [0, 2, 3])
+def test_three_demonstrations_of_one_change_each_tell_the_delay(late: int) -> None:
+    bell = (Feature("x"), Feature("bell", FeatureKind.BINARY))
+    table = replace(joined(*(visits(late, seed) for seed in range(3))), features=bell)
+    found = estimate(table)
+    assert found.rows == late
+    assert found.in_bits == (late > 0)
 
 
 @pytest.mark.parametrize(
