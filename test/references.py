@@ -62,7 +62,7 @@ def parser_of(command: str) -> argparse.ArgumentParser:
         raise _ParserError(parser)
 
     main = main_of(command)
-    with mock.patch.object(argparse.ArgumentParser, "parse_args", caught):
+    with mock.patch.object(argparse.ArgumentParser, "parse_intermixed_args", caught):
         try:
             main([])
         except _ParserError as err:

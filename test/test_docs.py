@@ -116,7 +116,7 @@ def test_every_command_in_the_docs_has_the_options_that_it_is_given(
             if name in commands:
                 with contextlib.redirect_stderr(None):
                     try:
-                        references.parser_of(name).parse_args(arguments)
+                        references.parser_of(name).parse_intermixed_args(arguments)
                     except SystemExit:
                         pytest.fail(f"{page.name}: {name} {shlex.join(arguments)}")
                 continue

@@ -24,14 +24,16 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("tree", type=Path, metavar="TREE", help="tree.json of a learned tree")
     parser.add_argument(
         "--state",
+        action="append",
         metavar="NAME=VALUE,…",
-        help="the state; features that are not named are missing",
+        help="the state; features that are not named are missing; may be given several times",
     )
     parser.add_argument(
         "--done",
-        default="",
+        action="append",
+        default=[],
         metavar="ACTION,…",
-        help="what was done before, the most recent action last",
+        help="what was done before, the most recent action last; may be given several times",
     )
     parser.add_argument(
         "--row",
@@ -53,7 +55,9 @@ def _explain(parsed: argparse.Namespace) -> None:
     if (parsed.state is None) == (parsed.row is None):
         raise OptionError("say what to explain: either --state, or --row with an INPUT.")
     if parsed.state is not None:
-        situation = Situation(state_of(parsed.state, learned), histories_of(parsed.done, learned))
+        situation = Situation(
+            state_of(",".join(parsed.state), learned), histories_of(",".join(parsed.done), learned)
+        )
     else:
         situation = row_of(
             learned, parsed.row, parsed.demonstration, parsed.inputs, reading=reading

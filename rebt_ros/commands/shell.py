@@ -31,9 +31,16 @@ _Word = TypeVar("_Word", bound=Enum)
 def parse(
     parser: argparse.ArgumentParser, arguments: Sequence[str] | None = None
 ) -> argparse.Namespace:
-    """What the command line says; to be called first of all."""
+    """What the command line says; to be called first of all.
+
+    Options may stand anywhere among the inputs: ``learn one.csv --out learned another.csv``.
+    """
     streams.prepare()
-    return parser.parse_args(arguments)
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    if "--" in words:
+        # What `parse_intermixed_args` makes of names that begin with a dash depends on the Python.
+        return parser.parse_args(words)
+    return parser.parse_intermixed_args(words)
 
 
 def run(command: Callable[[], None], name: str) -> None:

@@ -75,12 +75,28 @@ def load_learning(path: str | Path) -> Learning:
     """
     path = Path(path)
     if path.is_dir():
-        path = path / NAME
+        path = _in_directory(path)
     words, arrays = read_arrays(path)
     try:
         return restored(Saved(words, arrays))
     except InputError as err:
         raise InputError(f"{path} cannot be used: {err}") from err
+
+
+def _in_directory(directory: Path) -> Path:
+    path = directory / NAME
+    if path.exists():
+        return path
+    channels = sorted(one.parent for one in directory.glob(f"channels/*/{NAME}"))
+    if channels:
+        names = ", ".join(map(str, channels))
+        raise InputError(f"{directory} has a tree for each of several channels: name one, {names}.")
+    if (directory / "tree.json").exists():
+        raise InputError(
+            f"{directory} has a tree and no {NAME}: that is not written for more than "
+            f"{MOST_VALUES} values (rows times features); learn from fewer rows."
+        )
+    raise InputError(f"{path} does not exist: name the directory that `learn` wrote to.")
 
 
 @dataclass(frozen=True, slots=True)

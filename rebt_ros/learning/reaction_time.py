@@ -253,7 +253,7 @@ class _Explanations:
         if with_previous.size <= _MUCH_SIMPLER * alone.size and not much_simpler:
             # Half a way late, a task that needs memory seems to need none, and mistakes weigh less:
             # once each, and not again where they are the previous action.
-            trials = tuple(one for one in trials if one.rows < half_a_run)
+            trials = tuple(one for one in trials if one.rows < max(half_a_run, 1))
         return trials, False
 
     def _around(self, without: Trial, size: Callable[[int], float]) -> tuple[Trial, ...]:

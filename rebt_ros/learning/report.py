@@ -9,6 +9,8 @@ conflict
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +21,7 @@ from rebt_ros.arrays import IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.demonstration.equal_states import codes_of_states
 from rebt_ros.demonstration.last_action import History
+from rebt_ros.demonstration.schema import number_of
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning.judged_levels import JudgedLevels
 from rebt_ros.learning.sample_report import SampleReport
@@ -30,6 +33,10 @@ FORECAST = "a weak one: rank correlation with success 0.2 to 0.6 within a task"
 
 #: So many actions are listed in a sentence.
 _LISTED = 12
+
+#: What people put around and between words.
+_QUOTES = " \t\"'`“”\u2018\u2019«»"
+_BETWEEN_WORDS = re.compile(r"(?<=[^\W\d_])[-_\s]+(?=[^\W\d_])|\s+")
 
 #: Conflicts that are mentioned: the share of the rows from which on they matter.
 _MENTIONED = 0.001
@@ -82,12 +89,15 @@ class LearningReport:
                     f"the tree never takes {action.label!r}, which was shown {action.rows} "
                     f"{'times' if action.rows > 1 else 'time'}"
                 )
-        alike: dict[str, list[str]] = {}
+        alike: dict[str | float, list[str]] = {}
         for action in self.actions:
-            alike.setdefault(" ".join(action.label.casefold().split()), []).append(action.label)
+            alike.setdefault(_as_meant(action.label), []).append(action.label)
         for same in alike.values():
             if len(same) > 1:
-                named = ", ".join(map(repr, same))
+                looks = {unicodedata.normalize("NFKC", label) for label in same}
+                # What looks the same is told apart by its code points.
+                shown = repr if len(looks) == len(same) else ascii
+                named = ", ".join(map(shown, same))
                 yield f"{named} are different actions: write them alike if they are one"
         if self.conflicts > _MENTIONED * self.rows:
             left = (
@@ -202,6 +212,17 @@ def _conflicts(situations: IntArray, chosen: IntArray) -> int:
     np.minimum.at(least, of_row, chosen)
     np.maximum.at(most, of_row, chosen)
     return int(np.sum((least != most)[of_row]))
+
+
+def _as_meant(label: str) -> str | float:
+    """What labels have in common that people write for one action.
+
+    Case, blanks, hyphens and underscores between words, quotes, Unicode forms and ways to write a
+    number do not count.
+    """
+    text = unicodedata.normalize("NFKC", label).casefold().strip(_QUOTES)
+    number = number_of(text)
+    return _BETWEEN_WORDS.sub(" ", text) if number is None else number
 
 
 def _listed(words: Sequence[str]) -> str:

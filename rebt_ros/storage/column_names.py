@@ -21,7 +21,7 @@ _TELLING = 200
 #: Columns of these names, in any case, number or date the rows.
 _NUMBERING = frozenset({"stamp", "time", "timestamp", "index", "unnamed: 0", "#"})
 #: Columns of these names do where their values rise from every row to the next.
-_COUNTING = re.compile(r"id|nr|no|n|row|step|seq|sequence|frame|tick|.*(?:index|_id)")
+_COUNTING = re.compile(r"(?:.*[._/])?seq|id|nr|no|n|row|step|sequence|frame|tick|.*(?:index|_id)")
 #: Columns of these names do where their values rise or stay: clocks are coarse.
 _DATING = re.compile(r"t|elapsed|.*(?:time|stamp|date|clock)")
 #: Fewer rows do not tell whether values rise.
@@ -34,6 +34,8 @@ _SECONDS = frozenset({"sec", "secs"})
 _UNIT_OF_TIME = re.compile(
     r"[ _]*[\[(]?(?:s|secs?|seconds?|m?secs?|[mun]s|n(?:ano)?secs?|utc|unix|epoch)[\])]?\Z"
 )
+
+_LINE_BREAKS = re.compile(r"\s*[\r\n]\s*")
 
 #: The column of one of these names holds the actions, wherever it stands.
 _ACTIONS = frozenset({"action", "actions"})
@@ -58,7 +60,8 @@ def column_names(records: Records, labels: Sequence[str], *, header: bool) -> Co
         labels: Columns that hold the actions.
         header: Whether the first record is said to name the columns.
     """
-    first = [cell.strip() for cell in records.rows[0]]
+    # Spreadsheets break names into lines.
+    first = [_LINE_BREAKS.sub(" ", cell.strip()) for cell in records.rows[0]]
     width = len(first)
     numbered = tuple(f"x{place}" for place in range(width))
     if not header:

@@ -73,6 +73,8 @@ def test_a_state_is_explained_with_values_beside_thresholds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     lines = explained(tmp_path, capsys, "--state", "distance=0.25,battery=0.5")
+    apart = ("--state", "distance=0.25", "--state", "battery=0.5")
+    assert explained(tmp_path, capsys, *apart) == lines
     assert lines[:4] == [
         "turn",
         "  because distance ≤ 0.3 (distance = 0.25)",
@@ -88,7 +90,7 @@ def test_a_state_is_explained_with_values_beside_thresholds(
 def test_a_row_is_explained_from_the_rows_that_taught_its_branch(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    lines = explained(tmp_path, capsys, table_file(tmp_path), "--row", "1")
+    lines = explained(tmp_path, capsys, "--row", "1", table_file(tmp_path))
     assert lines[0] == "where distance = 0.8, battery = 0.5, docked = 1, kind = cup"
     assert lines[1] == "go"
     assert (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 import rebt_ros
 from rebt_ros.behavior_tree.learned_tree import Root
 from rebt_ros.commands import experiment, generate, learn, simulate
+from rebt_ros.commands.shell import parse
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.errors import RebtError
@@ -70,6 +72,23 @@ def test_an_input_without_a_name_is_not_the_current_directory(
     with pytest.raises(SystemExit):
         learn.main(["", "--out", "x"])
     assert "an input needs a name" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("line", ["x -a 1 y z", "x y z -a 1", "-a 1 x y z", "x y -a 1 z"])
+def test_options_may_stand_anywhere_among_inputs(line: str) -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("first")
+    parser.add_argument("inputs", nargs="+")
+    parser.add_argument("-a")
+    parsed = parse(parser, line.split())
+    assert (parsed.first, parsed.inputs, parsed.a) == ("x", ["y", "z"], "1")
+
+
+def test_names_that_begin_with_a_dash_are_inputs_behind_two_dashes() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("inputs", nargs="+")
+    parser.add_argument("-a")
+    assert parse(parser, ["-a", "1", "--", "-x", "-y"]).inputs == ["-x", "-y"]
 
 
 def _learn(inputs: Any = "nowhere.csv", **options: Any) -> None:

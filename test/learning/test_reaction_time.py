@@ -279,6 +279,17 @@ def test_who_goes_to_and_fro_and_errs_is_not_half_a_way_late(seed: int) -> None:
     assert estimate(paced(erring, TENTH // 2)).rows == 0
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_no_delay_shows_where_actions_take_turns_row_by_row(seed: int) -> None:
+    chance = np.random.default_rng(seed)
+    # Now and then one is left out, so that what was done before does not tell everything.
+    chosen = np.cumsum(1 + (chance.random(300) < 0.05)) % 3
+    table = joined((chance.normal(size=(300, 2)).tolist(), chosen.tolist()))
+    found = estimate(table)
+    assert found.rows == 0
+    assert (found.by_states_alone, found.trials[0].rows) == (False, 0)
+
+
 @given(some.tables(max_rows=30))
 def test_little_is_shown_and_nothing_is_found(table: DemonstrationTable) -> None:
     found = estimate(table)

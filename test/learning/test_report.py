@@ -145,14 +145,25 @@ def test_the_answer_names_the_forecast_what_to_hold_against_it_and_each_recall()
     )
 
 
-def test_actions_that_may_be_the_same_are_noted() -> None:
-    actions = ("GO", "go", "go ", "stop", "turn")
+@pytest.mark.parametrize(
+    ("actions", "named"),
+    [
+        (("GO", "go", "go ", "stop", "turn"), "'GO', 'go', 'go '"),
+        (("turn-left", "turn_left", "Turn left", "left"), "'turn-left', 'turn_left', 'Turn left'"),
+        (('"go"', "go", "stop"), "'\"go\"', 'go'"),
+        (("0", "0.0", "00", "1"), "'0', '0.0', '00'"),
+        (("zur\u00fcck", "zuru\u0308ck", "go"), r"'zur\xfcck', 'zuru\u0308ck'"),
+        (("vel+1", "vel-1", "turn 1", "turn-1", "nan", "NaNny"), None),
+    ],
+)
+def test_actions_that_may_be_the_same_are_noted(
+    actions: tuple[str, ...], named: str | None
+) -> None:
     report = LearningReport(
         tuple(ActionReport(one, 1, None, taken=True) for one in actions), None, None, 0.2, 0, 0, 5
     )
-    assert list(report.notes()) == [
-        "'GO', 'go', 'go ' are different actions: write them alike if they are one"
-    ]
+    said = f"{named} are different actions: write them alike if they are one"
+    assert list(report.notes()) == ([said] if named else [])
 
 
 def test_nothing_is_said_of_recall_where_nothing_was_judged() -> None:

@@ -202,6 +202,22 @@ def test_learning_from_files_writes_it_and_large_tables_say_that_there_is_none(
     result = rebt_ros.learn(table, out=tmp_path / "out")
     assert "there is no learning.npz, as the table is too large for it" in result.notes
     assert not (tmp_path / "out" / "learning.npz").exists()
+    with pytest.raises(InputError, match="is not written for more than 100 values"):
+        load_learning(tmp_path / "out")
+
+
+def test_of_several_channels_one_is_to_be_named(tmp_path: Path) -> None:
+    for channel in ("arm", "base"):
+        directory = tmp_path / "channels" / channel
+        directory.mkdir(parents=True)
+        write_learning(directory, learned())
+    with pytest.raises(InputError) as caught:
+        load_learning(tmp_path)
+    assert str(caught.value) == (
+        f"{tmp_path} has a tree for each of several channels: name one, "
+        f"{tmp_path}/channels/arm, {tmp_path}/channels/base."
+    )
+    load_learning(tmp_path / "channels" / "base")
 
 
 # --- files that are none ------------------------------------------------------------------------

@@ -360,6 +360,11 @@ def test_columns_are_called_what_the_file_says(text: str, names: list[str], tmp_
     assert read.notes
 
 
+def test_names_that_a_spreadsheet_broke_into_lines_are_of_one_line(tmp_path: Path) -> None:
+    read = _read(tmp_path, '"dist\r\n[m]",load,action\n0.5,6,go\n0.7,8,turn\n')
+    assert [feature.name for feature in read.demonstration.features] == ["dist [m]", "load"]
+
+
 @pytest.mark.parametrize(
     ("name", "cells"),
     [
@@ -369,6 +374,7 @@ def test_columns_are_called_what_the_file_says(text: str, names: list[str], tmp_
         ("header.stamp", "1.5,1.6,1.7"),
         ("id", "7,8,9"),
         ("frame_id", "0,1,2"),
+        ("field.header.seq", "0,1,2"),
         ("row", "3,4,7"),
         ("date", "20260101,20260102,20260103"),
     ],
