@@ -21,6 +21,7 @@ import checking
 import learning
 import node_rows
 import reading
+import relearning
 import robot_nodes
 import robot_reading
 import running
@@ -36,6 +37,7 @@ ROWS: dict[str, Callable[[Settings], list[Figure]]] = {
     "rules": learning.rules,
     "relearn": learning.relearn,
     "relearn-large": learning.relearn_large,
+    "relearn-again": relearning.one_more,
     "rest": node_rows.rest,
     "recorder": node_rows.recorder_cpu,
     "latency": node_rows.latency,

@@ -40,7 +40,7 @@ class Case:
 
 CASES = {
     "relearn": Case(20_000, 20),
-    "large": Case(1_000_000, 24, options=LearnOptions(max_depth=8)),
+    "large": Case(1_000_000, 24, options=LearnOptions(max_depth=8, exact=True)),
     "60 actions": Case(20_000, 20, actions=60),
     "200 features": Case(20_000, 200),
     "depth 12, no pruning": Case(

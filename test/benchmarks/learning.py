@@ -126,7 +126,7 @@ def rules(settings: Settings) -> list[Figure]:
 
 def growth(settings: Settings) -> list[Figure]:
     """How the time of learning grows up to ten times as much of something."""
-    options = LearnOptions(max_depth=8)
+    options = LearnOptions(max_depth=8, exact=True)
     base = Case(settings.size(20_000, 400), 6, actions=6, options=options)
     # So many that what does not depend on their number is little beside the rest.
     many = replace(base, rows=settings.size(100_000, 800))
