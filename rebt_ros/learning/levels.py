@@ -66,6 +66,12 @@ class Evidence:
         known = ~self.held_out
         return without_mistakes(self.table.where(known), self.intended[known])
 
+    @property
+    def rows_learned_from(self) -> BoolArray:
+        """Which of all rows these are, shape (rows,)."""
+        meant = np.asarray(self.intended == self.table.chosen)
+        return meant if self.options.refit else meant & ~self.held_out
+
     def decision_tree_at(self, ccp_alpha: float) -> TrainedTree:
         """The decision tree of a pruning level, with thresholds as the options say."""
         if self.options.readable_thresholds and self.options.upsample is Upsampling.NONE:

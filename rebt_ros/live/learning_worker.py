@@ -206,7 +206,8 @@ def learn(
     }
     sentences = [f"{channel}{one.in_short()}" for channel, one in led.items()]
     accounts = {read.demonstration.name: read.account for read in reads if read.account}
-    result = OfflineLearning(learned, learnings, tuple(notes), accounts, kept.rules)
+    paths = {one.name: Path(request.demonstrations, one.name) for one in demonstrations}
+    result = OfflineLearning(learned, learnings, tuple(notes), accounts, kept.rules, paths=paths)
     lesson = Lesson(
         dumps(learned),
         " ".join((pipeline.summary_sentence(learned), *sentences)),

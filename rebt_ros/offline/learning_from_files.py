@@ -100,6 +100,7 @@ def learn(
     progress("reading", 0.0)
     paths = as_paths(inputs)
     loaded = load(paths, replace(reading, features=reading.features | frozenset(declared)))
+    files = {one.name: path for one, path in zip(loaded.demonstrations, loaded.paths, strict=True)}
     tables = tuple(
         replace(table, robot=loaded.robot)
         for table in tabulate(loaded.demonstrations, declared, loaded.weights)
@@ -128,6 +129,7 @@ def learn(
         proven,
         aside=loaded.aside,
         excluded=loaded.excluded,
+        paths=files,
         weights=weights,
     )
     if out is not None:

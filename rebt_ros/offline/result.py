@@ -19,6 +19,7 @@ from rebt_ros.storage.account import Account
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.input_options import Aside
 from rebt_ros.storage.versions import versions
+from rebt_ros.verification.tracing import TracedLeaf, trace_leaves
 
 #: Packages whose versions can change a result.
 _DECIDING_PACKAGES = ("numpy", "scikit-learn", "pyeda", "py_trees")
@@ -42,6 +43,8 @@ class OfflineLearning:
     """Inputs that could not be read, and were left out."""
     excluded: tuple[Path, ...] = ()
     """Inputs that were left out as asked."""
+    paths: Mapping[str, Path] = field(default_factory=dict)
+    """The file of each demonstration, as far as it is known."""
     weights: Mapping[str, int] = field(default_factory=dict)
     """How often the rows of each demonstration count; empty where all count once."""
 
@@ -56,6 +59,7 @@ def write_summary(
         "set_aside": [{"path": str(aside.path), "reason": aside.reason} for aside in result.aside],
         "excluded": [str(path) for path in result.excluded],
         "weights": dict(result.weights),
+        "provenance": list(_traced(result)),
         "notes": list(result.notes),
         "random_state": options.random_state,
         "upsample": options.upsample.value,
@@ -112,6 +116,46 @@ def summarize(result: OfflineLearning) -> dict[str, Any]:
         return summary | _choices(result.learnings[0])
     return summary | {
         "channels": {learning.table.channel: _of_channel(learning) for learning in result.learnings}
+    }
+
+
+def _traced(result: OfflineLearning) -> Iterator[dict[str, Any]]:
+    """Where each leaf of the tree comes from, channel by channel."""
+    tree = result.learned.tree
+    policies = nodes.policies(tree)
+    for learning in result.learnings:
+        evidence, channel = learning.evidence, learning.table.channel
+        # What takes no action at all is no policy.
+        policy = policies.get(channel)
+        if policy is None:
+            continue
+        beside = [place for place, child in enumerate(nodes.children(tree)) if child is policy]
+        traced = trace_leaves(
+            policy,
+            evidence.table,
+            evidence.learned_from,
+            evidence.rows_learned_from,
+            () if policy is tree else tuple(beside[:1]),
+        )
+        yield {
+            "channel": channel,
+            "rows": traced.rows,
+            "rows_without_leaf": traced.without,
+            "leaves": [_leaf(leaf, result.paths) for leaf in traced.leaves],
+        }
+
+
+def _leaf(leaf: TracedLeaf, files: Mapping[str, Path]) -> dict[str, Any]:
+    return {
+        "path": list(leaf.path),
+        "action": leaf.action.label,
+        "rows": leaf.support.rows,
+        "actions": dict(leaf.support.actions),
+        "demonstrations": leaf.demonstrations,
+        "stretches": [
+            asdict(one) | {"file": str(file) if (file := files.get(one.demonstration)) else None}
+            for one in leaf.stretches
+        ],
     }
 
 

@@ -157,6 +157,9 @@ _INVERTED = {
     Outcome.FAILURE: Outcome.SUCCESS,
     Outcome.RUNNING: Outcome.RUNNING,
 }
+#: Rows that are looked at at a time.
+_ROWS_AT_A_TIME = 65_536
+
 #: Of the children of a Parallel, what decides, the strongest first.
 _DECIDING = (Outcome.FAILURE, Outcome.RUNNING)
 
@@ -173,8 +176,15 @@ def acting_leaves(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
     """
     numbered, count = _numbered(tree, 0)
     actions = tuple(nodes.Action(str(place), table.channel) for place in range(count))
-    columns = history_columns(table.actions, table.previous, table.last)
-    return choose(numbered, actions, States(table.features, table.states, columns))
+    acting = np.empty(len(table), dtype=np.int64)
+    # In parts, so that a large table is not held a second time.
+    for start in range(0, len(table), _ROWS_AT_A_TIME):
+        rows = slice(start, start + _ROWS_AT_A_TIME)
+        columns = history_columns(table.actions, table.previous[rows], table.last[rows])
+        acting[rows] = choose(
+            numbered, actions, States(table.features, table.states[rows], columns)
+        )
+    return acting
 
 
 def _numbered(node: nodes.Node, count: int) -> tuple[nodes.Node, int]:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -27,21 +25,8 @@ from rebt_ros.verification.grid import Boxes, Field, Grid
 from rebt_ros.verification.proof import grid_of, policies_of
 from rebt_ros.verification.reference import Reference, of_table, of_tree
 from rebt_ros.verification.states import Point, Unsettled, nearest
+from rebt_ros.verification.support import Support, support_of
 from rebt_ros.verification.sweep import Results, Sweep, Ticks, sweep
-
-#: How many rows that taught a branch are named.
-_ROWS_NAMED: Final = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Support:
-    """The rows in which a branch acts."""
-
-    rows: int
-    actions: tuple[tuple[str, int], ...]
-    """What was done in them, the most frequent action first."""
-    demonstrations: tuple[tuple[str, int, float], ...]
-    """The demonstrations with most of them: name, rows, seconds from its start to the first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,21 +143,9 @@ def _explained(
         flips = tuple(_flips(learned, grid, done, values, history, action, shown))
     support = None
     if table is not None and acting is not None:
-        support = _support(tree, table, acting.leaf)
+        rows = np.flatnonzero(acting_leaves(tree, table) == acting.leaf)
+        support = support_of(table, rows)
     return Explanation(channel, traced, action, support, flips, grid)
-
-
-def _support(tree: nodes.Node, table: DemonstrationTable, leaf: int) -> Support:
-    rows = np.flatnonzero(acting_leaves(tree, table) == leaf)
-    labels = Counter(table.actions[code] for code in table.chosen[rows].tolist())
-    numbers = Counter(table.demonstration[rows].tolist())
-    named = []
-    for number, count in numbers.most_common(_ROWS_NAMED):
-        start = int(np.searchsorted(table.demonstration, number))
-        first = int(rows[table.demonstration[rows] == number][0])
-        seconds = float(table.stamps[first] - table.stamps[start]) / 1e9
-        named.append((table.demonstrations[number], count, seconds))
-    return Support(len(rows), tuple(labels.most_common()), tuple(named))
 
 
 def _flips(

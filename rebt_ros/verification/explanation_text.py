@@ -10,7 +10,8 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.wording import Wording, name_text
 from rebt_ros.verification.acting import Outcome, Step
 from rebt_ros.verification.describing import action_text, before_text, value_text
-from rebt_ros.verification.explaining import Explanation, Flip, Support, failing, values_read
+from rebt_ros.verification.explaining import Explanation, Flip, failing, values_read
+from rebt_ros.verification.support import Support
 
 #: How many changes are listed.
 _CHANGES: Final = 3
