@@ -23,7 +23,7 @@ PERIOD = 0.05
 #: Where seeds of demonstrations begin, and how many each set has; other episodes have larger ones.
 _FIRST_SEED, _SEEDS = 100_000, 10_000
 #: Number of the last set.
-MOST_SETS = 99
+MOST_SETS = 399
 #: A demonstrator who fails so often in a row is no use.
 _MOST_FAILURES = 500
 
