@@ -17,10 +17,22 @@ State: TypeAlias = Mapping[str, Value] | Sequence[Value]
 
 
 class Encoding:
-    """States as a tree reads them: numbers, 0 or 1, positions in a feature's categories, NaN."""
+    """States as a tree reads them: numbers, 0 or 1, positions in a feature's categories, NaN.
+
+    Args:
+        features: Of the tree.
+
+    Raises:
+        InputError: All of them look back, so that a state has nothing to look back at.
+    """
 
     def __init__(self, features: Sequence[Feature]) -> None:
         present = [feature for feature in features if not feature.lag]
+        if features and not present:
+            raise InputError(
+                f"the tree has no feature of the present row beside {features[0].name!r}, "
+                "which looks back: learn it again."
+            )
         self.names = tuple(feature.name for feature in present)
         self._present = present
         self._codes = [

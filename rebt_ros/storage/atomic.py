@@ -15,8 +15,12 @@ class StorageError(RebtError):
 
 
 def write_text_atomically(path: Path, text: str) -> None:
-    """Writes a UTF-8 file and its missing parent directories; see `write_bytes_atomically`."""
-    write_bytes_atomically(path, text.encode("utf-8"))
+    """Writes a UTF-8 file and its missing parent directories; see `write_bytes_atomically`.
+
+    Names of files need not be UTF-8.  What stands for their bytes is written as an escape, which
+    JSON reads back.
+    """
+    write_bytes_atomically(path, text.encode("utf-8", "backslashreplace"))
 
 
 def write_bytes_atomically(path: Path, content: bytes) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from rebt_ros.errors import InputError
+from rebt_ros.errors import InputError, printable
 from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
 from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.input_options import InputKind, Source
@@ -83,10 +83,11 @@ def names_of(sources: Sequence[Source | Strange]) -> tuple[str, ...]:
     >>> names_of([Source(Path("a/run.csv"), InputKind.TABLE), Source(Path("b"), InputKind.BAG)])
     ('run.csv', 'b')
     """
-    names = [source.path.absolute().name for source in sources]
+    # Names of files need not be UTF-8, or printable; those of demonstrations are written to files.
+    names = [printable(source.path.absolute().name) for source in sources]
     counts = Counter(names)
     return tuple(
-        name if counts[name] == 1 else str(source.path)
+        name if counts[name] == 1 else printable(str(source.path))
         for name, source in zip(names, sources, strict=True)
     )
 

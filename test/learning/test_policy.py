@@ -21,6 +21,7 @@ from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.lags import with_lags
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import InputError, RebtError
+from rebt_ros.learning.named_states import Encoding
 from rebt_ros.learning.policy import Decision, Policy
 from rebt_ros.logic.conditions import (
     Condition,
@@ -343,3 +344,8 @@ def test_features_of_a_lag_are_read_from_the_steps_before() -> None:
     assert [policy.act([value]) for value in (1.0, 2.0, 1.5, 1.5)] == ["wait", "go", "wait", "go"]
     policy.reset()
     assert policy.act([3.0]) == "wait"
+
+
+def test_features_that_all_look_back_have_nothing_to_look_back_at() -> None:
+    with pytest.raises(InputError, match="no feature of the present row beside 'x\\[t-1\\]'"):
+        Encoding([Feature("x[t-1]", index=0, lag=1)])

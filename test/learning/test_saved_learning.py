@@ -343,3 +343,17 @@ def test_revise_exports_again_what_was_exported(
         assert exported.exists() is bool(expected)
         assert not exported.exists() or exported.read_text() == expected
         assert f"btcpp.xml is gone: {refusal}" in out or not refusal
+
+
+def test_names_of_files_that_are_not_utf_8_are_written_as_escapes(tmp_path: Path) -> None:
+    table = tmp_path / "caf\udce9.csv"
+    rows = "".join(f"{x},{'go' if x > 15 else 'stop'}\n" for x in range(30))
+    try:
+        table.write_text(f"x,action\n{rows}")
+    except OSError:
+        pytest.skip("this file system has UTF-8 names only")
+    result = rebt_ros.learn([table], out=tmp_path / "out")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    assert summary["inputs"] == [str(table)]
+    assert summary["provenance"][0]["leaves"][0]["stretches"][0]["file"] == str(table)
+    assert dumps(load_learning(tmp_path / "out").learned) == dumps(result.learned)
