@@ -23,7 +23,7 @@ p, li { max-width: 46rem; } .faded { color: var(--faded); }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.3rem 0.8rem; border-bottom: 1px solid var(--grid); text-align: right;
   vertical-align: top; }
-th:first-child, td:first-child, td.words { text-align: left; }
+th:first-child, td:first-child, .words { text-align: left; }
 td.words { font-size: 0.85rem; min-width: 18rem; overflow-wrap: anywhere; }
 svg { width: 100%; max-width: 760px; height: auto; display: block; margin: 0.8rem 0; }
 """
@@ -54,7 +54,12 @@ def table(rows: Sequence[Sequence[str]], words: int = 0) -> str:
     """
     heading, *lines = rows
     numbers = len(heading) - words
-    head = "".join(f'<th scope="col">{text(cell)}</th>' for cell in heading)
+    head = "".join(
+        f'<th scope="col" class="words">{text(cell)}</th>'
+        if place >= numbers
+        else f'<th scope="col">{text(cell)}</th>'
+        for place, cell in enumerate(heading)
+    )
     body = "\n".join(
         "<tr>"
         + "".join(
