@@ -29,7 +29,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         prog="check",
         description="Proves or refutes rules of a learned tree for every state, and says what is "
-        "noticeable about it. The exit code is 1 where a rule is not proven.",
+        "noticeable about it. The exit code is 1 unless every rule is proven.",
     )
     parser.add_argument("tree", type=Path, metavar="TREE", help="tree.json of a learned tree")
     parser.add_argument("--rules", type=Path, metavar="FILE", help="rules.yaml (docs/rules.md)")

@@ -20,7 +20,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         prog="describe",
         description="Lists the topics of a bag, or of the running robot, with their types, rates "
-        "and the values of each field (* varies), and writes a robot file to begin with.",
+        "and the values of each field (* varies), and writes a first robot file.",
     )
     parser.add_argument("bag", nargs="?", type=Path, metavar="BAG", help="a rosbag2 bag")
     parser.add_argument("--live", action="store_true", help="look at the running robot instead")
@@ -31,7 +31,7 @@ def main(arguments: list[str] | None = None) -> None:
         metavar="SECONDS",
         help="how long to look at the running robot (default: %(default)s)",
     )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write a robot file to begin with")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write a first robot file")
     parser.add_argument(
         "--force", action="store_true", help="write it even where there is such a file"
     )

@@ -18,22 +18,22 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="explain",
-        description="Says which branch of a learned tree acts in a state, why, and what would have "
-        "to change for something else.",
+        description="Explains which branch of a learned tree acts in a state, why, and which "
+        "change would lead to another action.",
     )
     parser.add_argument("tree", type=Path, metavar="TREE", help="tree.json of a learned tree")
     parser.add_argument(
         "--state",
         action="append",
         metavar="NAME=VALUE,…",
-        help="the state; features that are not named are missing; may be given several times",
+        help="the state; features that are not named are missing; repeatable",
     )
     parser.add_argument(
         "--done",
         action="append",
         default=[],
         metavar="ACTION,…",
-        help="what was done before, the most recent action last; may be given several times",
+        help="what was done before, the most recent action last; repeatable",
     )
     parser.add_argument(
         "--row",

@@ -111,8 +111,8 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
         "--rules",
         type=Path,
         metavar="FILE",
-        help="rules.yaml (docs/rules.md): where the tree is not proven to keep them, nothing is "
-        "written; rules of the robot file count in any case",
+        help="rules.yaml (docs/rules.md): unless the tree is proven to obey them, nothing is "
+        "written; rules of the robot file always count",
     )
     parser.add_argument(
         "--repair",
@@ -130,7 +130,7 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=100,
         metavar="N",
-        help="with --levels: so many levels at most, evenly spread (default: %(default)s)",
+        help="with --levels: at most this many levels, evenly spread (default: %(default)s)",
     )
 
 

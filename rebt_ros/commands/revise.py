@@ -31,14 +31,14 @@ def main(arguments: list[str] | None = None) -> None:
         action="append",
         default=[],
         metavar="ID",
-        help="attach this suggestion, or `all`; may be given several times",
+        help="attach this suggestion, or `all`; repeatable",
     )
     parser.add_argument(
         "--detach",
         action="append",
         default=[],
         metavar="ID",
-        help="take this suggestion, or `all`, off again; may be given several times",
+        help="detach this suggestion, or `all`; repeatable",
     )
     parser.add_argument(
         "--psa-choice",

@@ -60,12 +60,12 @@ def _split(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="trial",
-        description="Lets the executor drive with each tree, and tells which one succeeds most "
-        "often. Those that do worse leave early (successive halving). While a trial runs, its "
-        "tree is the one that drives: where somebody else, such as the learner, publishes another "
-        "on behavior_tree, that is published again afterwards, and the episode is driven again. "
-        "The executor is disabled between episodes and afterwards. Ctrl-C stops the robot and "
-        "reports what is known so far.",
+        description="Lets the executor drive with each tree and reports which one succeeds most "
+        "often. Worse trees drop out early (successive halving). During a trial its own tree "
+        "drives: if another node, such as the learner, publishes a tree on behavior_tree, the "
+        "episode is driven again, and that tree is republished afterwards. The executor is "
+        "disabled between episodes and afterwards. Ctrl-C stops the robot and reports what is "
+        "known so far.",
     )
     parser.add_argument("trees", nargs="*", type=Path, metavar="TREE", help="a tree.json")
     parser.add_argument(
@@ -79,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
         type=int,
         default=_EPISODES,
         metavar="N",
-        help="what each of the last trees drives in all; the others leave after fewer "
+        help="episodes that each of the last trees drives in all; the others drop out earlier "
         "(default: %(default)s)",
     )
     parser.add_argument("--out", type=Path, metavar="FILE", help="also write all results as JSON")
@@ -119,7 +119,7 @@ def _add_outcome(parser: argparse.ArgumentParser) -> None:
         "--time-limit",
         type=float,
         metavar="SECONDS",
-        help="an episode that takes longer is a failure, also one in which a person takes over "
+        help="a longer episode is a failure, and so is one in which a person takes over "
         f"(default: {DEFAULT_TIME_LIMIT:g}; with --ask: none)",
     )
 

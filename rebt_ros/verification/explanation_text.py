@@ -47,7 +47,7 @@ def lines(learned: LearnedTree, values: Sequence[float], explained: Explanation)
     if explained.support is not None:
         yield from _supported(explained.support)
     if explained.flips:
-        yield "  The least changes for something else:"
+        yield "  Smallest changes that lead to another action:"
         for flip in explained.flips[:_CHANGES]:
             yield f"    {_changed(learned, values, flip)} → {action_text(flip.action)}"
     elif explained.flips is not None:

@@ -81,7 +81,7 @@ def test_a_state_is_explained_with_values_beside_thresholds(
         "  Branches before it that did not act:",
         "    wait: does not hold: battery ≤ 0.2 (battery = 0.5)",
     ]
-    assert lines[4] == "  The least changes for something else:"
+    assert lines[4] == "  Smallest changes that lead to another action:"
     assert lines[5].startswith("    distance = 0.3")
     assert lines[5].endswith("→ go")
     assert lines[6].endswith("→ wait")
