@@ -153,7 +153,8 @@ def _leaf(leaf: TracedLeaf, files: Mapping[str, Path]) -> dict[str, Any]:
         "actions": dict(leaf.support.actions),
         "demonstrations": leaf.demonstrations,
         "stretches": [
-            asdict(one) | {"file": str(file) if (file := files.get(one.demonstration)) else None}
+            asdict(one)
+            | {"file": str(file.absolute()) if (file := files.get(one.demonstration)) else None}
             for one in leaf.stretches
         ],
     }
