@@ -299,6 +299,14 @@ def tables(
 condition_nodes = st.builds(nodes.Condition, literals())
 
 
+def on_channel(channel: str, node: nodes.Node) -> nodes.Node:
+    """The tree with its actions on a channel."""
+    if isinstance(node, nodes.Action):
+        return nodes.Action(node.label, channel)
+    children = (on_channel(channel, child) for child in nodes.children(node))
+    return nodes.with_children(node, tuple(children))
+
+
 def trees(
     leaves: st.SearchStrategy[nodes.Node] | None = None,
     *,

@@ -62,7 +62,7 @@ def _inspect(parsed: argparse.Namespace) -> None:
 
 
 def _print(inspection: Inspection) -> None:
-    several = len({one.channel for one in inspection.actions}) > 1
+    several = inspection.several_channels
     lines = [cells(one, several=several) for one in inspection.demonstrations]
     print("\n".join(aligned([HEADING, *lines], words=1)))
     print(summary(inspection))

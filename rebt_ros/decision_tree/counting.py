@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, IntArray
+from rebt_ros.arrays import BoolArray, IntArray, in_parts
 from rebt_ros.decision_tree.encoding import encode
-from rebt_ros.decision_tree.fitted import FittedTree, in_parts
+from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.pruning import pruning_path
 from rebt_ros.decision_tree.training import PLAIN, FitOptions, fit_parts
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -51,7 +51,7 @@ def counted(
     actions = len(table.actions)
     weights = table.row_weights
     counts = [np.zeros(len(tree.grown) * actions, dtype=np.int64) for tree in trees]
-    for rows in in_parts(table):
+    for rows in in_parts(len(table)):
         matrix = encode(table, trees[0].vocabulary, rows)
         for tree, part, count in zip(trees, parts, counts, strict=True):
             inside = part[rows]

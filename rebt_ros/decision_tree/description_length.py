@@ -37,21 +37,14 @@ def shortest_description(fitted: FittedTree) -> Description:
     the rows of its node, whose value is the threshold.
     """
     grown = fitted.grown
-    rows = grown.counts.sum(axis=1)
+    rows = np.maximum(grown.counts.sum(axis=1), 1)
     actions = max(int(np.count_nonzero(grown.counts[0])), 2)
-    exception_bits = math.log2(max(rows[0], 1)) + math.log2(actions - 1)
-    exceptions = (rows - grown.counts.max(axis=1)).tolist()
-    bits = [1 + math.log2(actions) + wrong * exception_bits for wrong in exceptions]
-    threshold_bits = np.log2(np.maximum(rows, 1)).tolist()
-    left, right, column = (one.tolist() for one in (grown.left, grown.right, grown.column))
-    # Children come after their parents.
-    for node in range(len(grown) - 1, -1, -1):
-        if left[node] < 0:
-            continue
-        split = 1 + math.log2(len(fitted.asked)) + bits[left[node]] + bits[right[node]]
-        if isinstance(fitted.asked[column[node]], Number):
-            split += threshold_bits[node]
-        if split < bits[node]:
-            bits[node] = split
-            exceptions[node] = exceptions[left[node]] + exceptions[right[node]]
-    return Description(bits[0], int(exceptions[0]), exception_bits)
+    exception_bits = math.log2(rows[0]) + math.log2(actions - 1)
+    exceptions = rows - grown.counts.max(axis=1)
+    compares = np.array([isinstance(asked, Number) for asked in fitted.asked])[
+        np.maximum(grown.column, 0)
+    ]
+    split = 1 + math.log2(len(fitted.asked)) + np.where(compares, np.log2(rows), 0.0)
+    bits, is_leaf = grown.cheapest(1 + math.log2(actions) + exceptions * exception_bits, split)
+    leaves = np.unique(fitted.path.standing(is_leaf)[grown.left < 0])
+    return Description(bits, int(exceptions[leaves].sum()), exception_bits)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray, in_parts
 from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.behavior_tree.nodes import Action
 from rebt_ros.behavior_tree.prediction import history_columns
@@ -30,9 +29,6 @@ from rebt_ros.logic.conditions import (
     PreviousActionIs,
     Threshold,
 )
-
-#: Rows that are predicted at a time.
-_ROWS_AT_A_TIME = 65_536
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -128,16 +124,9 @@ class FittedTree:
 
     def _explaining(self) -> tuple[int, BoolArray]:
         """The size of the explanation, and which nodes are its leaves, or would be if reached."""
-        grown, sizes = self.grown, self._sizes().tolist()
-        left, other = grown.left.tolist(), grown.right.tolist()
-        is_leaf = grown.left < 0
-        # Children come after their parents.
-        for node in range(len(grown) - 1, -1, -1):
-            if left[node] >= 0:
-                parted = sizes[left[node]] + sizes[other[node]]
-                is_leaf[node] = sizes[node] <= parted
-                sizes[node] = min(sizes[node], parted)
-        return int(sizes[0]), is_leaf
+        sizes = self._sizes()
+        least, is_leaf = self.grown.cheapest(sizes, np.zeros_like(sizes))
+        return int(least), is_leaf
 
     @property
     def explanations(self) -> IntArray:
@@ -241,7 +230,7 @@ class FittedTree:
 def _reached(grown: GrownTree, table: DemonstrationTable, vocabulary: Vocabulary) -> IntArray:
     """The leaf as grown that each row reaches, shape (rows,)."""
     reached = np.empty(len(table), dtype=np.int64)
-    for rows in in_parts(table):
+    for rows in in_parts(len(table)):
         reached[rows] = grown.apply(encode(table, vocabulary, rows))
     return reached
 
@@ -254,7 +243,7 @@ def _compared(
 ) -> IntArray:
     """The leaf that each row reaches with thresholds in double precision, shape (rows,)."""
     reached = np.empty(len(table), dtype=np.int64)
-    for rows in in_parts(table):
+    for rows in in_parts(len(table)):
         values = _Values(grown, table, vocabulary, rows)
         node = reached[rows]
         node[:] = 0
@@ -278,7 +267,7 @@ def _gaps(
         Two of shape (nodes,): -inf and inf where there is none.
     """
     low, high = np.full(len(grown), -np.inf), np.full(len(grown), np.inf)
-    for rows in in_parts(table):
+    for rows in in_parts(len(table)):
         values = _Values(grown, table, vocabulary, rows)
         node = np.zeros(rows.stop - rows.start, dtype=np.int64)
         under_way = np.arange(len(node))
@@ -290,12 +279,6 @@ def _gaps(
             np.minimum.at(high, at[~left], value[~left])
             node[under_way] = np.where(left, grown.left[at], grown.right[at])
     return low, high
-
-
-def in_parts(table: DemonstrationTable) -> Iterator[slice]:
-    """Stretches of a table, so that a large one is not held a second time."""
-    for start in range(0, len(table), _ROWS_AT_A_TIME):
-        yield slice(start, min(start + _ROWS_AT_A_TIME, len(table)))
 
 
 class _Values:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rebt_ros.arrays import Float32Array, FloatArray, IntArray
+from rebt_ros.arrays import BoolArray, Float32Array, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -36,6 +36,29 @@ class GrownTree:
     def majority(self) -> IntArray:
         """The most frequent action of each node, of equals the first, shape (nodes,)."""
         return np.asarray(np.argmax(self.counts, axis=1))
+
+    def cheapest(
+        self, leaf: FloatArray | IntArray, split: FloatArray | IntArray
+    ) -> tuple[float, BoolArray]:
+        """The tree pruned so that it costs least; of equals, the one with the fewest leaves.
+
+        Args:
+            leaf: What each node costs where it is a leaf, shape (nodes,).
+            split: What it costs where it is none, beside its children, shape (nodes,).
+
+        Returns:
+            The costs, and which nodes are leaves, or would be if reached, shape (nodes,).
+        """
+        costs, parting = leaf.tolist(), split.tolist()
+        left, other = self.left.tolist(), self.right.tolist()
+        is_leaf = self.left < 0
+        # Children come after their parents.
+        for node in range(len(self) - 1, -1, -1):
+            if left[node] >= 0:
+                parted = parting[node] + costs[left[node]] + costs[other[node]]
+                is_leaf[node] = costs[node] <= parted
+                costs[node] = min(costs[node], parted)
+        return costs[0], is_leaf
 
     def apply(self, matrix: Float32Array) -> IntArray:
         """The leaf that each row of a matrix reaches, shape (rows,).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray, in_parts
 from rebt_ros.behavior_tree.shown import (
     MOST_SHOWN_LEAVES,
     ShownChannel,
@@ -12,7 +12,7 @@ from rebt_ros.behavior_tree.shown import (
     ShownValues,
     Span,
 )
-from rebt_ros.decision_tree.fitted import TrainedTree, in_parts
+from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 
@@ -41,7 +41,7 @@ def shown_rows(table: DemonstrationTable, trained: TrainedTree) -> ShownChannel:
     group_of_leaf[leaves] = _groups(len(leaves), most)
     rows = np.bincount(group_of_leaf[leaves], weights=reached[leaves]).astype(np.int64)
     columns = [_Values(feature, len(rows)) for feature in table.features]
-    for part in in_parts(table):
+    for part in in_parts(len(table)):
         group_of_row = group_of_leaf[leaf_of_row[part]]
         order = np.argsort(group_of_row, kind="stable")
         starts = np.flatnonzero(np.diff(group_of_row[order], prepend=-1))

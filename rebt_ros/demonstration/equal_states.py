@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.arrays import FloatArray, IntArray, in_parts
 
 #: Odd numbers that stir hashes of states.
 _GOLDEN, _ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD6E8FEB86659FD93)
-
-#: Rows that are looked at at a time.
-_ROWS_AT_A_TIME = 65_536
 
 
 def codes_of_states(states: FloatArray) -> IntArray:
@@ -24,9 +21,9 @@ def codes_of_states(states: FloatArray) -> IntArray:
     """
     hashes = np.zeros(len(states), dtype=np.uint64)
     # In parts, as a large table may be on disk, where going through it once takes long enough.
-    for start in range(0, len(states), _ROWS_AT_A_TIME):
-        part = hashes[start : start + _ROWS_AT_A_TIME]
-        for column in states[start : start + len(part)].T:
+    for rows in in_parts(len(states)):
+        part = hashes[rows]
+        for column in states[rows].T:
             # 0 has two signs, and NaN many forms.
             values = np.where(np.isnan(column), np.nan, column) + 0.0
             part[:] = _mixed(part + _GOLDEN) ^ _mixed(values.view(np.uint64))

@@ -14,14 +14,11 @@ from typing import Final
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, FloatArray
+from rebt_ros.arrays import BoolArray, FloatArray, in_parts
 from rebt_ros.errors import InputError
 
 #: Arrays of that size and more are on disk (bytes).
 ON_DISK: Final = 1 << 28
-
-#: Rows that are copied at a time, by way of memory.
-_ROWS_AT_A_TIME: Final = 65_536
 
 #: For large files that need not survive a restart (see hier(7)): /tmp may be in memory.
 _ROOM: Final = Path("/var/tmp")
@@ -54,8 +51,7 @@ def rows_of(states: FloatArray, rows: BoolArray) -> FloatArray:
     """Some rows of an array as one of their own, shape (rows, columns)."""
     places = np.flatnonzero(rows)
     found = roomy((len(places), states.shape[1]))
-    for start in range(0, len(places), _ROWS_AT_A_TIME):
-        part = slice(start, start + _ROWS_AT_A_TIME)
+    for part in in_parts(len(places)):
         found[part] = states[places[part]]
     return found
 

@@ -192,6 +192,11 @@ class Inspection:
     notes: tuple[str, ...] = ()
     """What was not looked for, and why; no full stops."""
 
+    @property
+    def several_channels(self) -> bool:
+        """Whether actions were shown on several channels."""
+        return len({one.channel for one in self.actions}) > 1
+
 
 #: Name of the form in JSON.
 FORMAT: Final = "rebt_ros inspection"

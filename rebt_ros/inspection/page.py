@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from rebt_ros.behavior_tree.wording import name_text
 from rebt_ros.drawing.html import page, paragraph, table, text
-from rebt_ros.inspection.inspection import ActionCount, Inspected, Inspection
-from rebt_ros.inspection.wording import HEADING, cells, findings_of, summary
+from rebt_ros.inspection.inspection import Inspected, Inspection
+from rebt_ros.inspection.wording import HEADING, action_name, cells, findings_of, summary
 
 #: Actions with a colour of their own, the most frequent ones.
 _COLORED: Final = 6
@@ -30,12 +29,8 @@ def inspection_page(inspection: Inspection) -> str:
     return page("rebt_ros: demonstrations", body, _STYLE)
 
 
-def _several(inspection: Inspection) -> bool:
-    return len({one.channel for one in inspection.actions}) > 1
-
-
 def _head(inspection: Inspection) -> Iterator[str]:
-    several = _several(inspection)
+    several = inspection.several_channels
     yield "<h1>Demonstrations</h1>"
     yield paragraph(summary(inspection))
     for note in inspection.notes:
@@ -65,10 +60,10 @@ def _actions(inspection: Inspection) -> Iterator[str]:
         (one.channel, one.action): min(place, _COLORED) + 1
         for place, one in enumerate(inspection.actions)
     }
-    several = _several(inspection)
+    several = inspection.several_channels
     yield "<h2>Actions</h2>"
     keys = [
-        f"<li>{_colored('key', place + 1, '')}{text(_label(one, several=several))}</li>"
+        f"<li>{_colored('key', place + 1, '')}{text(action_name(one, several=several))}</li>"
         for place, one in enumerate(inspection.actions[:_COLORED])
     ]
     if len(inspection.actions) > _COLORED:
@@ -79,10 +74,6 @@ def _actions(inspection: Inspection) -> Iterator[str]:
         for one in inspection.demonstrations
     )
     yield f'<div class="wide"><table>\n<tbody>\n{lines}\n</tbody>\n</table></div>'
-
-
-def _label(one: ActionCount, *, several: bool) -> str:
-    return f"{f'{one.channel}: ' if several else ''}{name_text(one.action)}"
 
 
 def _bar(inspected: Inspected, colors: dict[tuple[str, str], int]) -> str:

@@ -62,12 +62,14 @@ def _stretches(found: Stretches | None) -> str:
     return f"{found.count} ({length})"
 
 
+def action_name(action: ActionCount, *, several: bool) -> str:
+    """What an action is called, with its channel where there are several."""
+    return f"{f'{action.channel}: ' if several else ''}{name_text(action.action)}"
+
+
 def actions_text(actions: Sequence[ActionCount], *, several: bool) -> str:
     """Actions with their rows, the most frequent ones by name."""
-    named = [
-        f"{f'{one.channel}: ' if several else ''}{name_text(one.action)} {one.rows}"
-        for one in actions[:_LISTED]
-    ]
+    named = [f"{action_name(one, several=several)} {one.rows}" for one in actions[:_LISTED]]
     more = len(actions) - _LISTED
     return ", ".join([*named, *([f"{more} more"] if more > 0 else [])])
 

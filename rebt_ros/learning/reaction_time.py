@@ -198,6 +198,7 @@ class _Explanations:
         place, _ = places(table)
         # Rows whose state and previous action are known whatever the delay is.
         self._rows = _stretches(np.flatnonzero(place >= most))
+        self._half_a_run = _HALF_A_RUN * _usual_run(table)
         self._trees: dict[tuple[int, Vocabulary], FittedTree] = {}
 
     def __len__(self) -> int:
@@ -224,7 +225,7 @@ class _Explanations:
         clear = (
             before.bits - after.bits >= least
             and after.bits <= _LARGEST * named_one_by_one
-            and best.rows < _HALF_A_RUN * _usual_run(self._table)
+            and best.rows < self._half_a_run
             # Where the longest delay is clearly better, descriptions may go on to become shorter.
             and trials[-1].size >= best.size - _BITS
         )
@@ -242,10 +243,9 @@ class _Explanations:
                 return (one,), one is alone
         trials = self._around(alone, lambda delay: self._size(delay, FEATURES_ALONE))
         best = _peak(trials)
-        half_a_run = _HALF_A_RUN * _usual_run(self._table)
         held = without_delay.explaining_leaves <= _BEGUN_AND_HELD * least
         needs_memory = held and not _clear((with_previous, *trials[1:]), len(self))
-        tells = best.rows < half_a_run and best.size <= _ALONE * with_previous.size
+        tells = best.rows < self._half_a_run and best.size <= _ALONE * with_previous.size
         if tells and not (_clear(trials, len(self)) and needs_memory):
             return trials, True
         trials = self._around(with_previous, lambda delay: self._size(delay, _WITH_PREVIOUS))
@@ -253,7 +253,7 @@ class _Explanations:
         if with_previous.size <= _MUCH_SIMPLER * alone.size and not much_simpler:
             # Half a way late, a task that needs memory seems to need none, and mistakes weigh less:
             # once each, and not again where they are the previous action.
-            trials = tuple(one for one in trials if one.rows < max(half_a_run, 1))
+            trials = tuple(one for one in trials if one.rows < max(self._half_a_run, 1))
         return trials, False
 
     def _around(self, without: Trial, size: Callable[[int], float]) -> tuple[Trial, ...]:

@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from rebt_ros.arrays import IntArray
+from rebt_ros.arrays import IntArray, in_parts
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import States, as_it_stands, choose, history_columns
 from rebt_ros.demonstration.last_action import ActionHistory
@@ -157,8 +157,6 @@ _INVERTED = {
     Outcome.FAILURE: Outcome.SUCCESS,
     Outcome.RUNNING: Outcome.RUNNING,
 }
-#: Rows that are looked at at a time.
-_ROWS_AT_A_TIME = 65_536
 
 #: Of the children of a Parallel, what decides, the strongest first.
 _DECIDING = (Outcome.FAILURE, Outcome.RUNNING)
@@ -177,9 +175,7 @@ def acting_leaves(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
     numbered, count = _numbered(tree, 0)
     actions = tuple(nodes.Action(str(place), table.channel) for place in range(count))
     acting = np.empty(len(table), dtype=np.int64)
-    # In parts, so that a large table is not held a second time.
-    for start in range(0, len(table), _ROWS_AT_A_TIME):
-        rows = slice(start, start + _ROWS_AT_A_TIME)
+    for rows in in_parts(len(table)):
         columns = history_columns(table.actions, table.previous[rows], table.last[rows])
         acting[rows] = choose(
             numbered, actions, States(table.features, table.states[rows], columns)

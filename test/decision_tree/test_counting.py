@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_pruning import noisy_table
 
+from rebt_ros import arrays
 from rebt_ros.arrays import FloatArray
-from rebt_ros.decision_tree import fitted as fitted_module
 from rebt_ros.decision_tree.counting import counted, fit_parts_by_sample
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree
@@ -85,6 +85,6 @@ def test_rows_are_encoded_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     everything = [np.ones(100, dtype=bool)]
     fitted = fit(table.where(np.arange(100) < 50))
     (whole,) = counted([fitted], table, everything)
-    monkeypatch.setattr(fitted_module, "_ROWS_AT_A_TIME", 7)
+    monkeypatch.setattr(arrays, "_ROWS_AT_A_TIME", 7)
     (in_parts,) = counted([fitted], table, everything)
     assert in_parts.grown.counts.tolist() == whole.grown.counts.tolist()

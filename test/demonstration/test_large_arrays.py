@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rebt_ros import arrays
 from rebt_ros.arrays import FloatArray
 from rebt_ros.demonstration import large_arrays
 from rebt_ros.demonstration.demonstration import Demonstration
@@ -60,7 +61,7 @@ def test_without_room_there_is_a_sentence(monkeypatch: pytest.MonkeyPatch, on_di
 def test_rows_are_taken_in_parts(
     monkeypatch: pytest.MonkeyPatch, on_disk: Path, at_a_time: int
 ) -> None:
-    monkeypatch.setattr(large_arrays, "_ROWS_AT_A_TIME", at_a_time)
+    monkeypatch.setattr(arrays, "_ROWS_AT_A_TIME", at_a_time)
     states: FloatArray = np.random.default_rng(0).normal(size=(200, 3))
     rows = np.arange(200) % 2 == 0
     assert is_mapped(rows_of(states, rows))

@@ -90,24 +90,11 @@ def _made(
     return rebt_ros.to_py_trees(learned, _behaviours(robot), lambda: state["now"])
 
 
-def _on(channel: str, node: nodes.Node) -> nodes.Node:
-    """The tree with its actions on a channel."""
-    match node:
-        case nodes.Condition():
-            return node
-        case nodes.Action(label=label):
-            return nodes.Action(label, channel)
-        case nodes.Inverter(child=child):
-            return nodes.Inverter(_on(channel, child))
-    children = tuple(_on(channel, child) for child in nodes.children(node))
-    if isinstance(node, nodes.Sequence | nodes.Selector):
-        return type(node)(children, node.memory)
-    return type(node)(children)
-
-
 ACTING = some.trees().filter(lambda tree: bool(nodes.actions(tree)))
 TWO_CHANNELS = st.tuples(ACTING, ACTING).map(
-    lambda trees: nodes.Parallel((_on("arm", trees[0]), _on("base", trees[1])))
+    lambda trees: nodes.Parallel(
+        (some.on_channel("arm", trees[0]), some.on_channel("base", trees[1]))
+    )
 )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray, in_parts
 from rebt_ros.demonstration.table import DemonstrationTable
 
 #: Positions of actions in the order in which they were done.
@@ -14,8 +14,6 @@ Word = tuple[int, ...]
 
 #: Moments that are looked at; of more, as many are taken from all over the demonstrations.
 _MOST_MOMENTS = 25_000
-#: Rows that are compared at a time: a large table is not held a second time.
-_ROWS_AT_A_TIME = 65_536
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,12 +55,11 @@ def moments(table: DemonstrationTable) -> Moments:
         if not now:
             # Without a state there is but the time to tell moments apart.
             alike &= np.diff(table.stamps) == 0
-        for start in range(0, len(alike), _ROWS_AT_A_TIME):
-            part = alike[start : start + _ROWS_AT_A_TIME]
-            states = table.states[start : start + len(part) + 1]
+        for rows in in_parts(len(alike)):
+            states = table.states[rows.start : rows.stop + 1]
             for column in now:
                 after, before = states[1:, column], states[:-1, column]
-                part &= (after == before) | (np.isnan(after) & np.isnan(before))
+                alike[rows] &= (after == before) | (np.isnan(after) & np.isnan(before))
         begins[1:] = ~alike
     first = np.flatnonzero(begins)
     last = np.append(first[1:], len(table))
