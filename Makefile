@@ -52,6 +52,8 @@ studio: build ## Show a simulated robot its task, and go on in the studio: learn
 # that crashed is not replaced: pytest-xdist may wait for ever then (its issues 784 and 1323).
 # colcon test succeeds when tests fail; colcon test-result and the count do not.
 test: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+# Of the studio's page, step by step.
+test: export REBT_ROS_PICTURES ?= $(CURDIR)/build/pictures
 test: build ## Run the tests on the built package.
 	@.ci/browser.sh
 	@status=0; \

@@ -15,6 +15,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from studio_client import StudioClient, url_of
 
+from rebt_ros.ros.studio.calls import CallError, Calls
 from rebt_ros.studio.access import COOKIE, HEADERS
 
 PORT = {"port": 0}
@@ -295,6 +296,17 @@ def test_a_person_teaches_learns_edits_publishes_and_the_robot_does_it(
         client.wait(lambda: client.board["tree"]["document"] == before)
 
 
+def test_a_call_is_given_up_once_the_node_that_lost_it_rests(peer: Peer) -> None:
+    # It is never spun, so that it never answers.
+    peer.node.create_service(Trigger, "learner/relearn", lambda _, response: response)
+    calls = Calls(peer.node)
+    calls.prepare([], ["learner/relearn"])
+    works = iter((True, True, False))
+    with pytest.raises(CallError, match="learner/relearn did not answer"):
+        calls.trigger("learner/relearn", patience=0.01, works=lambda: next(works))
+    assert next(works, None) is None
+
+
 def test_it_ends_in_order_while_a_service_keeps_it_waiting(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
@@ -308,22 +320,21 @@ def test_it_ends_in_order_while_a_service_keeps_it_waiting(
         assert "Traceback" not in studio.stderr
 
 
-def test_two_browsers_see_the_same_and_heal_when_nodes_come_back(
+def test_two_browsers_see_the_same(
     studio: NodeProcess, domain: int, peer: Peer, tmp_path: Path
 ) -> None:
     with StudioClient(url_of(studio)) as one, StudioClient(url_of(studio)) as other:
-        for _ in range(2):
-            with NodeProcess("recorder", domain, tmp_path) as recorder:
-                for client in (one, other):
-                    client.wait(lambda client=client: client.board["nodes"]["recorder"]["there"])
-                peer.connect(String, "action")
-                peer.state(0.0)
-                peer.action("go")
-                one.does("record", on=True)
-                assert "A new demonstration has begun" in one.does("new_demonstration")["message"]
-                recorder.stop()
+        with NodeProcess("recorder", domain, tmp_path) as recorder:
             for client in (one, other):
-                client.wait(lambda client=client: not client.board["nodes"]["recorder"]["there"])
+                client.wait(lambda client=client: client.board["nodes"]["recorder"]["there"])
+            peer.connect(String, "action")
+            peer.state(0.0)
+            peer.action("go")
+            one.does("record", on=True)
+            assert "A new demonstration has begun" in one.does("new_demonstration")["message"]
+            recorder.stop()
+        for client in (one, other):
+            client.wait(lambda client=client: not client.board["nodes"]["recorder"]["there"])
         one.wait(lambda: one.board["demonstrations"])
         other.wait(lambda: other.board["demonstrations"] == one.board["demonstrations"])
         assert json.dumps(one.board["names"]) == json.dumps(other.board["names"])

@@ -43,7 +43,10 @@ def studio() -> Iterator[Pretend]:
 
 
 @pytest.fixture
-def pictures() -> Path | None:
-    """Where pictures of the page are kept; None: nowhere (``REBT_ROS_PICTURES`` says it)."""
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where pictures of the page are kept.
+
+    ``REBT_ROS_PICTURES`` names the directory; otherwise pytest's own, of which it keeps three.
+    """
     kept = os.environ.get("REBT_ROS_PICTURES")
-    return Path(kept) if kept else None
+    return Path(kept) if kept else tmp_path_factory.getbasetemp() / "pictures"

@@ -291,14 +291,12 @@ def test_two_trees_stand_side_by_side(seen: Browser) -> None:
         seen.until(lambda tree=tree: len(seen.all(f"{tree} .node")) == size)
 
 
-def test_pictures_of_all_sections(seen: Browser, pictures: Path | None) -> None:
-    if pictures is None:
-        pytest.skip("REBT_ROS_PICTURES names no directory")
-    for dark in (False, True):
-        seen.look(dark=dark)
-        for section in SECTIONS:
-            seen.section(section)
-            seen.picture(pictures / f"{section}{'_dark' if dark else ''}.png")
+def test_pictures_of_all_sections(seen: Browser, pictures: Path) -> None:
+    for section in SECTIONS:
+        seen.section(section)
+        seen.picture(pictures / f"{section}.png")
+    seen.look(dark=True)
+    seen.picture(pictures / "explain_dark.png")
 
 
 # --- the connection ---
@@ -678,6 +676,19 @@ def test_a_refusal_is_a_sentence(page: Browser, studio: Pretend) -> None:
     page.press("#publish")
     page.sees("Not done. Publish cannot be done.", "#toasts")
     page.until(lambda: page.one("#publish").is_enabled())
+
+
+def test_a_long_answer_is_its_first_sentence_until_more_is_wanted(
+    page: Browser, studio: Pretend
+) -> None:
+    first, rest = "A tree of 3.5 nodes, as far as it goes, was made", "The rest, at length" * 20
+    studio.answers["undo"] = lambda _: (f"{first}. {rest}.", None)
+    page.section("curate")
+    page.press("#undo")
+    page.until(lambda: page.one("#toasts .words").text == f"{first}.")
+    page.press("#toasts button", "Say more")
+    page.sees(rest, "#toasts")
+    assert len(page.all("#toasts button")) == 1
 
 
 def test_other_names_are_shown_everywhere(page: Browser, studio: Pretend, asked: Any) -> None:

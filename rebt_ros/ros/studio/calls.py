@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import Any, Final
 
 from rclpy.client import Client
@@ -14,6 +15,8 @@ from rebt_ros.errors import RebtError
 
 #: For an answer (seconds).
 PATIENCE: Final = 10.0
+#: Between two looks at whether a node is still at work (seconds).
+_LOOK: Final = 0.5
 #: For a service that was not seen yet (seconds).
 _FINDING: Final = 2.0
 
@@ -58,19 +61,32 @@ class Calls:
         """
         return self._call(service, SetBool.Request(data=on), PATIENCE)
 
-    def trigger(self, service: str, patience: float | None = PATIENCE) -> str:
+    def trigger(
+        self,
+        service: str,
+        patience: float = PATIENCE,
+        works: Callable[[], bool] = lambda: False,
+    ) -> str:
         """Calls a service without arguments.
 
         Args:
             service: Its name.
-            patience: How long to wait for the answer (seconds); None for however long it takes.
+            patience: How long to wait for the answer (seconds).
+            works: Whether the node is seen to work on it, for which it has all the time it needs.
+                A node that was killed and started again knows nothing of the call, and rests.
 
         Raises:
             CallError: It is not there, does not answer, or refuses.
         """
-        return self._call(service, Trigger.Request(), patience)
+        return self._call(service, Trigger.Request(), patience, works)
 
-    def _call(self, service: str, request: Any, patience: float | None) -> str:
+    def _call(
+        self,
+        service: str,
+        request: Any,
+        patience: float,
+        works: Callable[[], bool] = lambda: False,
+    ) -> str:
         client = self._clients[service]
         if not client.wait_for_service(_FINDING):
             node = service.rpartition("/")[0]
@@ -80,15 +96,26 @@ class Calls:
                 raise CallError(_ENDING)
             future: Future = client.call_async(request)
             future.add_done_callback(self._note)
-            self._changed.wait_for(lambda: future.done() or self._ended, patience)
-        answer = future.result() if future.done() else None
+        answer = self._answer(future, patience, works)
         if answer is None:
             client.remove_pending_request(future)
-            late = f"{service} did not answer within {patience or 0:.0f} s: look at its log."
+            late = (
+                f"{service} did not answer within {patience:.0f} s: ask again, or look at its log."
+            )
             raise CallError(_ENDING if self._ended else late)
         if not answer.success:
             raise CallError(answer.message or f"{service} refused.")
         return str(answer.message) or "done."
+
+    def _answer(self, future: Future, patience: float, works: Callable[[], bool]) -> Any:
+        """What was answered; None if nothing was for as long as it is waited for."""
+        left = patience
+        while left > 0 and not (future.done() or self._ended):
+            # Counted in looks: time in which this machine stood still is no waiting.
+            with self._changed:
+                self._changed.wait_for(lambda: future.done() or self._ended, min(_LOOK, left))
+            left = patience if works() else left - _LOOK
+        return future.result() if future.done() else None
 
     def _note(self, _: Future) -> None:
         with self._changed:

@@ -145,7 +145,7 @@ class StudioNode(Node):
             "enable": lambda asked: calls.switch(f"{settings.executor}/enable", asked.flag("on")),
             "act": self._act,
             "learn": lambda _: self._workbench.learn(
-                lambda: calls.trigger(f"{settings.learner}/relearn", None)
+                lambda: calls.trigger(f"{settings.learner}/relearn", works=self._is_learning)
             ),
             "cancel": lambda _: calls.trigger(f"{settings.learner}/cancel"),
             "rollback": lambda _: calls.trigger(f"{settings.learner}/rollback"),
@@ -153,6 +153,11 @@ class StudioNode(Node):
             "moment": lambda asked: self._explaining.moment(asked.number("t")),
             "explain": self._explaining.explain,
         }
+
+    def _is_learning(self) -> bool:
+        learner = self._board.section(Section.NODES).get("learner", {})
+        stage: str = learner.get("values", {}).get("stage", "idle")
+        return stage != "idle"
 
     def _teaching(self) -> _Verbs:
         """Demonstrations."""
