@@ -16,6 +16,7 @@ from rebt_ros.commands.shell import aligned, parse, run
 from rebt_ros.errors import OptionError
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.trial.candidates import Candidate, distinct, of_files, of_levels
+from rebt_ros.trial.driven import write_driven
 from rebt_ros.trial.errors import TrialError
 from rebt_ros.trial.halving import Trial
 from rebt_ros.trial.outcome import Episode
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 _ROS_ARGUMENTS = "--ros-args"
 _EPISODES = 20
+
+#: Of learning.npz: as many as the studio shows.
+_MOST_LEVELS = 25
 
 #: Characters of a name in the progress bar.
 _SHOWN = 30
@@ -72,7 +76,8 @@ def _parser() -> argparse.ArgumentParser:
         "--levels",
         type=Path,
         metavar="DIR",
-        help="all pruning levels that 'learn --levels --out DIR' wrote",
+        help="all pruning levels of what 'learn --out DIR' or a learner wrote; DIR/trials.json "
+        "then says how often each succeeded, and the studio shows it",
     )
     parser.add_argument(
         "--episodes",
@@ -245,6 +250,11 @@ class _Command:
         print("\n".join(aligned(table(result))))
         print()
         print(verdict(result), flush=True)
+        if self._parsed.levels is not None:
+            write_driven(
+                self._parsed.levels,
+                [(self._candidates[one.candidate], one.tally) for one in result.standings],
+            )
         if self._parsed.out is not None:
             text = json.dumps(as_json(result), indent=2, ensure_ascii=False)
             write_text_atomically(self._parsed.out, text + "\n")
@@ -273,7 +283,21 @@ def _settings(parsed: argparse.Namespace) -> TrialSettings:
 def _candidates(parsed: argparse.Namespace) -> Iterator[Candidate]:
     yield from of_files(parsed.trees)
     if parsed.levels is not None:
-        yield from of_levels(parsed.levels)
+        yield from _levels(parsed.levels)
+
+
+def _levels(directory: Path) -> Iterator[Candidate]:
+    """The pruning levels in a directory; of learning.npz where none were written on their own."""
+    from rebt_ros.learning.learning_file import NAME, load_learning
+
+    if (directory / "levels").exists() or not (directory / NAME).is_file():
+        yield from of_levels(directory)
+        return
+    levels = load_learning(directory).levels
+    for number in levels.selected(_MOST_LEVELS):
+        level = levels.level(number)
+        chosen = " (chosen)" if level.chosen else ""
+        yield Candidate(f"level {number:02}{chosen}", level.learned, directory / NAME)
 
 
 if __name__ == "__main__":

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps
+from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.wording import Wording, summary
 from rebt_ros.demonstration.schema import FeatureKind
@@ -17,6 +18,7 @@ from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.learning import evaluation
 from rebt_ros.learning.learning import Learning
 from rebt_ros.studio.tree_view import Json, suggestion_views, tree_view
+from rebt_ros.trial.tally import Tally
 from rebt_ros.verification.contradictions import agreeing_demands
 from rebt_ros.verification.proof import Answer, check, verdicts
 from rebt_ros.verification.robot_rules import rules_of, together
@@ -30,8 +32,15 @@ _MOST_LEVELS: Final = 25
 _BARS: Final = 40
 
 
-def levels_view(learning: Learning) -> list[dict[str, Json]]:
-    """The pruning levels for a chart: size against what the tree does in cross-validation."""
+def levels_view(
+    learning: Learning, driven: Mapping[str, Tally] | None = None
+) -> list[dict[str, Json]]:
+    """The pruning levels for a chart: size against what the tree does.
+
+    Args:
+        learning: The policy.
+        driven: How often trees succeeded in driving trials, by the fingerprints of their documents.
+    """
     levels = learning.levels
     views = []
     for number in levels.selected(_MOST_LEVELS):
@@ -46,9 +55,21 @@ def levels_view(learning: Learning) -> list[dict[str, Json]]:
                 "recall": judged and judged.recall,
                 "chosen": level.chosen,
                 "best": level.best,
+                "drove": _drove((driven or {}).get(fingerprint(dumps(level.learned)))),
             }
         )
     return views
+
+
+def _drove(tally: Tally | None) -> dict[str, Json] | None:
+    if tally is None or tally.share is None:
+        return None
+    return {
+        "successes": tally.successes,
+        "episodes": tally.episodes,
+        "share": tally.share,
+        "interval": list(tally.interval),
+    }
 
 
 def learning_view(learning: Learning, levels: Sequence[Json]) -> dict[str, Json]:

@@ -22,6 +22,9 @@ from rebt_ros.studio.board import Board, Section
 from rebt_ros.studio.draft import Change, Draft
 from rebt_ros.studio.learning_view import draft_view, learning_view, levels_view
 from rebt_ros.studio.tree_view import Json, published_view
+from rebt_ros.trial.driven import NAME as TRIALS
+from rebt_ros.trial.driven import read_driven
+from rebt_ros.trial.tally import Tally
 from rebt_ros.verification.rules import RuleSet
 
 #: Hands a document to who publishes it; returns what that says, and the number of the version.
@@ -56,6 +59,9 @@ class Workbench:
         self._draft: Draft | None = None
         self._levels: list[dict[str, Json]] = []
         self._published: LearnedTree | None = None
+        self._driven: Mapping[str, Tally] = {}
+        self._trials_seen = 0
+        self._trial_problem = ""
         self._seen: tuple[int, int] | None = None
         self._versions_seen: tuple[tuple[str, int], ...] = ()
         self._names = _read_object(self._own / _NAMES)
@@ -100,6 +106,7 @@ class Workbench:
         """Looks for what was learned or published since; to be called every now and then."""
         with self._lock:
             self._look_for_learning()
+            self._look_for_trials()
             self._look_for_versions()
 
     def change(self, what: str, change: Change) -> str:
@@ -241,14 +248,39 @@ class Workbench:
             self._board.replace(Section.LEARNING, {"problem": str(err)})
             self._board.replace(Section.DRAFT, {})
             return
-        self._levels = levels_view(learning)
+        self._levels = self._levels_of(learning)
         self._work_on(Draft.begin(learning))
+
+    def _look_for_trials(self) -> None:
+        """Takes over what a driving trial has found since."""
+        modified = _modified(self._output / TRIALS)
+        if modified == self._trials_seen:
+            return
+        self._trials_seen = modified
+        try:
+            self._driven = read_driven(self._output)
+        except InputError as err:
+            self._driven, self._trial_problem = {}, str(err)
+        else:
+            self._trial_problem = ""
+        if self._draft is not None:
+            self._levels = self._levels_of(self._draft.steps[0].learning)
+            self._show_learning(self._draft.learning)
+
+    def _levels_of(self, learning: Learning) -> list[dict[str, Json]]:
+        return levels_view(learning, self._driven)
+
+    def _show_learning(self, learning: Learning) -> None:
+        view = learning_view(learning, self._levels)
+        if self._trial_problem:
+            view["notes"] = [*view["notes"], self._trial_problem]
+        self._board.replace(Section.LEARNING, view)
 
     def _show_draft(self) -> None:
         if self._draft is None:
             return
         learning = self._draft.learning
-        self._board.replace(Section.LEARNING, learning_view(learning, self._levels))
+        self._show_learning(learning)
         view = draft_view(learning, self._published, self._rules)
         steps = {"undo": self._draft.undoes, "redo": self._draft.redoes}
         self._board.replace(Section.DRAFT, view | steps)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,9 +23,18 @@ from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import Trigger
 from trial_examples import ALWAYS_GO, ALWAYS_LEFT, ANOTHER, BAD, GOOD
 
+import rebt_ros
+from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import dumps
+from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.commands import trial as trial_command
+from rebt_ros.learning.learning_file import write_learning
+from rebt_ros.ros.trial import driving
 from rebt_ros.storage.tree_file import write_tree
+from rebt_ros.trial.candidates import Candidate
+from rebt_ros.trial.driven import read_driven
+from rebt_ros.trial.outcome import Ending, Episode
 
 ROBOT = {"plain": True, "speedup": 100.0, "lockstep": True, "time_limit": 40.0}
 EXECUTOR = {"tick_on": "state", "state_timeout": 5.0}
@@ -302,6 +311,38 @@ def test_a_person_says_how_it_went(domain: int, peer: Peer, tmp_path: Path) -> N
     found = _found(tmp_path)
     assert found["winner"] == "go.json"
     assert (found["go.json"]["success"], found["left.json"]["success"]) == (1.0, 0.0)
+
+
+class PretendedDriving:
+    """Trees that drive without a robot: those of several nodes well."""
+
+    farewell = "No robot was here."
+
+    def drive(self, candidate: Candidate, number: int) -> Episode:
+        return Episode(candidate.nodes > 1, 1.0, Ending.TOLD)
+
+
+def test_the_levels_of_what_was_learned_drive_and_are_kept_for_the_studio(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    rows = [(x / 40, "back" if x < 10 else "go" if x < 25 else "stop") for x in range(40)]
+    table = "x,action\n" + "".join(f"{x},{label}\n" for x, label in rows)
+    for name in ("one.csv", "two.csv"):
+        (tmp_path / name).write_text(table)
+    policy = rebt_ros.learn([tmp_path / "one.csv", tmp_path / "two.csv"]).learnings[0]
+    write_learning(tmp_path, policy)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    monkeypatch.setattr(driving, "driving", lambda *_: nullcontext(PretendedDriving()))
+    trial_command.main(["--levels", str(tmp_path), "--episodes", "2", "--outcome-topic", "outcome"])
+    assert "level 00 (chosen)" in capsys.readouterr().out
+    levels = [policy.levels.level(number).learned for number in policy.levels.selected(25)]
+    sizes = {fingerprint(dumps(level)): nodes.size(level.tree) for level in levels}
+    driven = read_driven(tmp_path)
+    assert driven.keys() == sizes.keys()
+    assert len(sizes) > 2
+    assert {name: tally.share for name, tally in driven.items()} == {
+        name: float(size > 1) for name, size in sizes.items()
+    }
 
 
 def test_too_long_or_stopped_by_a_person_is_a_failure(

@@ -134,6 +134,8 @@ def node(message: str, *, there: bool = True, level: str = "OK", **values: str) 
 
 def levels() -> list[dict[str, Any]]:
     """Pruning levels."""
+    drove = {"successes": 18, "episodes": 20, "share": 0.9, "interval": [0.7, 0.97]}
+    trials = (drove, drove | {"successes": 8, "episodes": 10, "share": 0.8}, None, None)
     figures = [(9, 19, 0.92, 0.84), (6, 14, 0.89, 0.79), (3, 8, 0.76, 0.48), (1, 1, 0.62, 0.25)]
     return [
         {
@@ -144,8 +146,11 @@ def levels() -> list[dict[str, Any]]:
             "recall": recall,
             "chosen": number == 0,
             "best": number == 0,
+            "drove": drove,
         }
-        for number, (leaves, size, agreement, recall) in enumerate(figures)
+        for number, ((leaves, size, agreement, recall), drove) in enumerate(
+            zip(figures, trials, strict=True)
+        )
     ]
 
 

@@ -589,7 +589,10 @@ def test_a_size_is_chosen_on_the_chart_and_in_the_list(page: Browser, asked: Any
     page.section("learn")
     page.sees("never does it", '#learn-recalls [data-key="charge"]')
     page.one("#learn-chart .main-svg")
-    page.until(lambda: len(page.all("#learn-chart .scatterlayer .trace")) == 3)
+    # Agreement, recall, driving trials, and the one in the draft.
+    page.until(lambda: len(page.all("#learn-chart .scatterlayer .trace")) == 4)
+    page.until(lambda: len(page.all("#learn-chart .errorbar")) == 2)
+    page.sees("drove 18 of 20 episodes well", '#learn-levels [data-key="0"]')
     page.press_at("#learn-chart .scatterlayer .trace:first-child .point:nth-child(2)", 0.5)
     assert asked("level") == {"number": 2}
     page.press('#learn-levels [data-key="1"]')

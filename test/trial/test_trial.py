@@ -9,6 +9,7 @@ import random
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -25,6 +26,7 @@ from rebt_ros.behavior_tree.nodes import Selector
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.storage.tree_file import write_tree
 from rebt_ros.trial.candidates import Candidate, distinct, of_files, of_levels
+from rebt_ros.trial.driven import read_driven, write_driven
 from rebt_ros.trial.halving import FEWEST_EPISODES, Trial, going_on, places, ranked, rounds_of
 from rebt_ros.trial.outcome import Ending, Episode, success_of
 from rebt_ros.trial.result import TrialResult, as_json, table, verdict
@@ -420,6 +422,38 @@ def test_a_directory_without_levels_is_refused(
         (tmp_path / "levels" / "summary.json").write_text(summary)
     with pytest.raises(InputError, match=words):
         list(of_levels(tmp_path))
+
+
+@given(st.lists(tallies(), min_size=3, max_size=3))
+def test_what_a_trial_has_found_is_read_as_it_was_written(found: list[Tally]) -> None:
+    named = [Candidate("one", tree, Path()) for tree in (GOOD, BAD, learned(Selector((GO, LEFT))))]
+    with tempfile.TemporaryDirectory() as kept:
+        assert read_driven(Path(kept)) == {}
+        write_driven(Path(kept), zip(named, found, strict=True))
+        assert read_driven(Path(kept)) == {
+            one.fingerprint: tally
+            for one, tally in zip(named, found, strict=True)
+            if tally.episodes
+        }
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"trees": []}',
+        '{"trees": {"a": {"successes": 2, "episodes": 1}}}',
+        '{"trees": {"a": {"successes": 0.5, "episodes": 1}}}',
+        '{"trees": {"a": {"successes": -1, "episodes": 1}}}',
+        "[" * 100_000,
+    ],
+)
+def test_a_spoilt_file_of_a_trial_is_a_sentence(tmp_path: Path, text: str) -> None:
+    (tmp_path / "trials.json").write_text(text)
+    with pytest.raises(InputError, match=r"trials.json cannot be used .*: delete it"):
+        read_driven(tmp_path)
 
 
 def test_levels_of_several_channels_are_named(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ function plotly() {
 }
 
 /**
- * Draws size against agreement and recall.
+ * Draws size against agreement, recall and, where trees were let drive, success.
  *
  * @param {HTMLElement} host - Where.
  * @param {object[]} levels - As the studio sends them.
@@ -59,6 +59,8 @@ export async function drawLevels(host, levels, current, choose) {
     line("agreement", "agreement", color("--blue"), "circle", "solid"),
     line("recall, mean of all actions", "recall", color("--orange"), "square", "dot"),
   ];
+  const drove = sorted.filter((level) => level.drove);
+  if (drove.length) traces.push(success(drove, color("--green")));
   const chosen = sorted.find((level) => level.number === current);
   if (chosen && chosen.agreement !== null) traces.push(marked("in your draft", chosen, "circle-open", ink, 24));
   const layout = {
@@ -94,4 +96,33 @@ export async function drawLevels(host, levels, current, choose) {
     const [point] = event.points;
     if (point?.customdata !== undefined) choose(point.customdata);
   });
+}
+
+/** How often trees succeeded when they drove, each with what so few episodes leave open. */
+function success(levels, shade) {
+  const shares = levels.map((level) => level.drove.share);
+  const ends = levels.map((level) => level.drove.interval);
+  return {
+    name: "success when driving",
+    x: levels.map((level) => level.leaves),
+    y: shares,
+    customdata: levels.map((level) => level.number),
+    text: levels.map((level) => `${count(level.leaves, "leaf", "leaves")}: ${driveWords(level.drove)}`),
+    hoverinfo: "text",
+    mode: "markers",
+    marker: { symbol: "diamond", size: 13, color: shade },
+    error_y: {
+      type: "data",
+      symmetric: false,
+      array: ends.map(([, high], place) => high - shares[place]),
+      arrayminus: ends.map(([low], place) => shares[place] - low),
+      color: shade,
+      thickness: 2,
+    },
+  };
+}
+
+/** What a driving trial has found of a tree. */
+export function driveWords(drove) {
+  return `drove ${drove.successes} of ${count(drove.episodes, "episode")} well`;
 }

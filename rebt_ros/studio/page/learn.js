@@ -1,6 +1,6 @@
 // Learn: make a tree of the demonstrations, and choose its size.
 
-import { drawLevels } from "./chart.js";
+import { drawLevels, driveWords } from "./chart.js";
 import { fillOf } from "./colors.js";
 import { byId, element, keyed, setAttribute, setText, show } from "./dom.js";
 import { say } from "./toasts.js";
@@ -96,7 +96,7 @@ export class Learn {
   chart() {
     const { levels, level } = this.state.get("learning");
     const host = byId("learn-chart");
-    if (!levels?.some((one) => one.agreement !== null)) {
+    if (!levels?.some((one) => one.agreement !== null || one.drove)) {
       host.classList.remove("js-plotly-plot");
       host.replaceChildren(
         element("p", { class: "hint" }, "With several demonstrations there is a chart here: how often each size does what was shown."),
@@ -119,7 +119,7 @@ export class Learn {
         const marks = [level.chosen ? "recommended" : "", level.best ? "most agreement" : ""].filter(Boolean);
         setText(name, size);
         const does = level.agreement === null ? "" : `agreement ${percent(level.agreement)}, recall ${percent(level.recall)}`;
-        setText(figures, [does, ...marks].filter(Boolean).join(" · "));
+        setText(figures, [does, level.drove ? driveWords(level.drove) : "", ...marks].filter(Boolean).join(" · "));
       },
     );
   }
