@@ -74,7 +74,7 @@ test-lowest: ## Run the tests with the lowest versions of all dependencies (ARGS
 
 bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 bench: setup ## Measure us and the limit in turn, for docs/performance.md (ARGS="--only tick" for options).
-	@PYTHONPATH=.:test:$$PYTHONPATH $(VENV_PYTHON) test/benchmarks/bench.py $(ARGS)
+	@env -u PYTHONDONTWRITEBYTECODE PYTHONPATH=.:test:$$PYTHONPATH $(VENV_PYTHON) test/benchmarks/bench.py $(ARGS)
 
 bench-driving: setup ## Let what is learned drive, beside plain learners (ARGS="corrections", "--late 2", ...).
 	@PYTHONPATH=.:test/benchmarks:$$PYTHONPATH $(VENV_PYTHON) -m driving $(ARGS)

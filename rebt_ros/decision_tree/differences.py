@@ -12,7 +12,6 @@ from itertools import combinations
 from types import MappingProxyType
 
 import numpy as np
-from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.arrays import FloatArray
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary, columns, encode
@@ -54,6 +53,8 @@ def likely_differences(
     step = -(-len(table) // _MOST_ROWS)
     some = table.where(np.arange(len(table)) % step == 0)
     every = Vocabulary(vocabulary.history, possible)
+    from sklearn.tree import DecisionTreeClassifier
+
     classifier = DecisionTreeClassifier(random_state=random_state)
     classifier.fit(encode(some, every), some.chosen, sample_weight=some.row_weights)
     first = len(columns(table, FEATURES_ALONE))

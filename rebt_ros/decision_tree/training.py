@@ -8,10 +8,9 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from sklearn.tree import DecisionTreeClassifier
 
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree.nodes import Action
@@ -29,6 +28,9 @@ from rebt_ros.decision_tree.svm_smote import Upsampled, svm_smote
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
+
+if TYPE_CHECKING:
+    from sklearn.tree import DecisionTreeClassifier
 
 #: Tables and trees that are in the making at the same time, whatever the number of cores.
 _MOST_AT_A_TIME = 4
@@ -49,6 +51,9 @@ class FitOptions:
 
     def classifier(self) -> DecisionTreeClassifier:
         """What is fitted."""
+        # It takes longer to import than all else that shows a learned tree.
+        from sklearn.tree import DecisionTreeClassifier
+
         return DecisionTreeClassifier(
             criterion="gini", max_depth=self.max_depth, random_state=self.random_state
         )

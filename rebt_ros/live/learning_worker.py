@@ -114,6 +114,10 @@ def _warm_up() -> None:
     """Imports what takes long to import; what is missing is reported once it is asked for."""
     try:
         import rebt_ros.learning.pipeline  # noqa: F401
+        from rebt_ros.decision_tree.training import PLAIN
+
+        # scikit-learn is not imported before something is fitted.
+        PLAIN.classifier()
     except ImportError:
         return
 

@@ -25,6 +25,7 @@ import relearning
 import robot_nodes
 import robot_reading
 import running
+import studio_rows
 from harness import CHECKOUT, Figure, Settings, table, write
 
 ROWS: dict[str, Callable[[Settings], list[Figure]]] = {
@@ -41,6 +42,8 @@ ROWS: dict[str, Callable[[Settings], list[Figure]]] = {
     "rest": node_rows.rest,
     "recorder": node_rows.recorder_cpu,
     "latency": node_rows.latency,
+    "studio-start": studio_rows.start,
+    "studio-ticks": studio_rows.ticks,
     "robot-recorder": robot_nodes.recorder_cpu,
     "robot-latency": robot_nodes.latency,
     "growth": learning.growth,

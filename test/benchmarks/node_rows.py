@@ -24,9 +24,7 @@ _READY = {"bare": "ready", "recorder": "recording ", "executor": "disabled until
 
 
 @contextmanager
-def _started(
-    kind: str, domain: int, directory: Path, **parameters: object
-) -> Iterator[NodeProcess]:
+def started(kind: str, domain: int, directory: Path, **parameters: object) -> Iterator[NodeProcess]:
     command = [sys.executable, str(_BARE)] if kind == "bare" else None
     with NodeProcess(f"{kind}_node", domain, directory, parameters, command=command) as node:
         node.says(_READY[kind] if not parameters else "enabled: ")
@@ -39,7 +37,7 @@ def rest(settings: Settings) -> list[Figure]:
 
         def measure(kind: str) -> tuple[float, float]:
             start = time.perf_counter()
-            with _started(kind, domain, settings.directory) as node:
+            with started(kind, domain, settings.directory) as node:
                 seconds = time.perf_counter() - start
                 return seconds, resident(node.process.pid)
 
@@ -78,7 +76,7 @@ def latency(settings: Settings) -> list[Figure]:
     def measure(kind: str) -> list[float]:
         with (
             own_domain() as domain,
-            _started(kind, domain, settings.directory, **parameters.get(kind, {})),
+            started(kind, domain, settings.directory, **parameters.get(kind, {})),
             Peer(domain) as peer,
         ):
             return _round_trips(peer, states)
