@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 from py_trees.common import Status
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import String
 
@@ -107,6 +109,20 @@ class CommandChannels:
         return frozenset(channel.topic for channel in self._channels.values())
 
     @property
+    def publishers(self) -> Iterable[Publisher]:
+        """What sends the commands."""
+        return [channel.publisher for channel in self._channels.values()]
+
+    @property
+    def results(self) -> Iterable[Subscription]:
+        """What hears how actions ended."""
+        return [
+            channel.subscription
+            for channel in self._channels.values()
+            if channel.subscription is not None
+        ]
+
+    @property
     def sent(self) -> dict[str, str | None]:
         """The latest command of each channel; None where it rests."""
         return {name: channel.sent for name, channel in self._channels.items()}
@@ -175,8 +191,8 @@ class _Channel:
         self.sent: str | None = None
         self._node = node
         self._not_understood = not_understood
-        self._publisher = node.create_publisher(String, commands, 10)
-        self._subscription = (
+        self.publisher = node.create_publisher(String, commands, 10)
+        self.subscription = (
             node.create_subscription(String, results, self._on_result, 10) if results else None
         )
 
@@ -190,15 +206,15 @@ class _Channel:
 
     @property
     def topic(self) -> str:
-        return str(self._publisher.topic_name)
+        return str(self.publisher.topic_name)
 
     def publish(self, label: str) -> None:
-        self._publisher.publish(String(data=label))
+        self.publisher.publish(String(data=label))
 
     def close(self) -> None:
-        self._node.destroy_publisher(self._publisher)
-        if self._subscription is not None:
-            self._node.destroy_subscription(self._subscription)
+        self._node.destroy_publisher(self.publisher)
+        if self.subscription is not None:
+            self._node.destroy_subscription(self.subscription)
 
     def _on_result(self, message: String) -> None:
         if self.results is not None and not self.results.report(message.data):

@@ -7,11 +7,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
+from rclpy.duration import Infinite
 from rclpy.node import Node
-from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from rebt_ros.live.clock_watch import ClockWatch
 from rebt_ros.ros.node_clock import simulated_time
 
 #: How long a node may wait for others before it says so in its log (seconds).
@@ -45,6 +48,7 @@ class GraphWatch:
         self._node = node
         self._since: dict[str, float] = {}
         self._logged: set[str] = set()
+        self._clock = ClockWatch()
 
     def say(self, findings: Iterable[Finding]) -> list[str]:
         """Logs what is new, or has waited in vain for long enough; once, until it comes back.
@@ -87,11 +91,10 @@ class GraphWatch:
                     continue
                 fit, reason = qos_check_compatible(publisher.qos_profile, subscription.qos_profile)
                 if fit == QoSCompatibility.ERROR:
-                    reason = reason.strip().rstrip(";").removeprefix("ERROR: ")
                     name = _name(publisher)
                     yield Finding(
                         f"{name} offers incompatible QoS on {topic}, and none of its messages is "
-                        f"received ({reason})",
+                        f"received ({_plain(reason)})",
                         waits=name == _UNKNOWN,
                     )
 
@@ -111,6 +114,16 @@ class GraphWatch:
                 waits=_UNKNOWN in names,
             )
 
+    def mixed(self, states: Iterable[Subscription]) -> Iterator[Finding]:
+        """State topics on which several nodes publish, as several robots do without namespaces."""
+        for subscription in states:
+            yield from self.several(
+                subscription.topic_name,
+                "states",
+                "they are taken for those of a single robot; stop all but one, or give each robot "
+                "a namespace",
+            )
+
     def publishing(self, topic: str) -> list[str]:
         """The full names of the nodes that publish on a topic, sorted; equal names may recur."""
         nodes = {
@@ -119,19 +132,40 @@ class GraphWatch:
         }
         return sorted(name for _, name in nodes)
 
-    def unread(self, topics: Iterable[str]) -> Iterator[Finding]:
-        """Topics to which nobody listens."""
-        for topic in topics:
-            if not self._node.count_subscribers(topic):
+    def unread(self, publishers: Iterable[Publisher]) -> Iterator[Finding]:
+        """Publishers to which nobody listens, or nobody who can hear them."""
+        for publisher in publishers:
+            topic, sent = publisher.topic_name, _type_of(publisher)
+            subscriptions = self._node.get_subscriptions_info_by_topic(topic)
+            if not subscriptions:
                 yield Finding(f"nobody listens to {topic}", waits=True)
+            for subscription in subscriptions:
+                name = _name(subscription)
+                if subscription.topic_type != sent:
+                    yield Finding(
+                        f"{name} listens to {topic} for {subscription.topic_type}, not {sent}",
+                        waits=name == _UNKNOWN,
+                    )
+                    continue
+                fit, reason = qos_check_compatible(_offered(publisher), subscription.qos_profile)
+                if fit == QoSCompatibility.ERROR:
+                    yield Finding(
+                        f"{name} requests incompatible QoS on {topic}, and receives no message "
+                        f"({_plain(reason)})",
+                        waits=name == _UNKNOWN,
+                    )
 
     def timeless(self) -> Iterator[Finding]:
-        """That simulated time does not come, where it is in use."""
-        if simulated_time(self._node) == 0:
-            yield Finding(
-                "use_sim_time is set, and waiting for /clock: start the simulator, or unset it",
-                waits=True,
-            )
+        """That simulated time does not come, or does not go on, where it is in use."""
+        now = simulated_time(self._node)
+        if now is None or not self._clock.stands(now, time.monotonic()):
+            return
+        yield Finding(
+            "use_sim_time is set, and /clock has stopped: let the simulator go on"
+            if now
+            else "use_sim_time is set, and waiting for /clock: start the simulator, or unset it",
+            waits=True,
+        )
 
     def _publishers(self, topic: str) -> list[TopicEndpointInfo]:
         full = str(self._node.resolve_topic_name(topic))
@@ -144,7 +178,27 @@ def _name(endpoint: TopicEndpointInfo) -> str:
     return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
 
 
-def _type_of(subscription: Subscription) -> str:
-    kind: Any = subscription.msg_type
+def _offered(publisher: Publisher) -> QoSProfile:
+    """The QoS of a publisher of this node, as others see it."""
+    qos = publisher.qos_profile
+    # What was left open counts as zero here.
+    return QoSProfile(
+        depth=qos.depth,
+        reliability=qos.reliability,
+        durability=qos.durability,
+        deadline=qos.deadline if qos.deadline.nanoseconds else Infinite,
+        liveliness_lease_duration=qos.liveliness_lease_duration
+        if qos.liveliness_lease_duration.nanoseconds
+        else Infinite,
+    )
+
+
+def _plain(reason: str) -> str:
+    """Why QoS does not fit, without what else the middleware says."""
+    return reason.strip().rstrip(";").removeprefix("ERROR: ")
+
+
+def _type_of(endpoint: Subscription | Publisher) -> str:
+    kind: Any = endpoint.msg_type
     package, interface, *_ = kind.__module__.split(".")
     return f"{package}/{interface}/{kind.__name__}"

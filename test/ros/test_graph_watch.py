@@ -12,9 +12,11 @@ pytest.importorskip("rclpy")
 
 import rclpy
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from ros_processes import wait_until
-from std_msgs.msg import String
+from std_msgs.msg import Int32, String
 
 from rebt_ros.ros import graph_watch
 from rebt_ros.ros.graph_watch import Finding, GraphWatch
@@ -52,6 +54,46 @@ def test_nodes_are_counted_not_publishers(domain: int) -> None:
             assert _conflicts(watch) == [
                 "2 nodes publish trees on topic (/same, /same): stop all but one"
             ]
+
+
+def test_states_of_two_nodes_are_told_from_those_of_one(domain: int) -> None:
+    with _node("watcher", domain) as watcher, _node("first", domain) as one:
+        watch = GraphWatch(watcher)
+        states = watcher.create_subscription(String, "topic", lambda _: None, 1)
+        one.create_publisher(String, "topic", 1)
+        wait_until(lambda: watcher.count_publishers("topic") == 1)
+        assert list(watch.mixed([states])) == []
+        with _node("second", domain) as other:
+            other.create_publisher(String, "topic", 1)
+            wait_until(lambda: watcher.count_publishers("topic") == 2)
+            wait_until(lambda: "unknown" not in "".join(f.sentence for f in watch.mixed([states])))
+            [finding] = watch.mixed([states])
+            assert "2 nodes publish states on /topic (/first, /second)" in finding.sentence
+
+
+@pytest.mark.parametrize(
+    ("kind", "qos", "said"),
+    [
+        (String, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL), "QoS"),
+        (String, QoSProfile(depth=1, deadline=Duration(seconds=1)), "QoS"),
+        (Int32, QoSProfile(depth=1), "for std_msgs/msg/Int32, not std_msgs/msg/String"),
+        (String, QoSProfile(depth=1), ""),
+        (String, QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT), ""),
+    ],
+)
+def test_who_listens_and_hears_nothing_is_named(
+    kind: type, qos: QoSProfile, said: str, domain: int
+) -> None:
+    with _node("watcher", domain) as watcher, _node("robot", domain) as robot:
+        watch = GraphWatch(watcher)
+        commands = watcher.create_publisher(String, "topic", 1)
+        assert [one.sentence for one in watch.unread([commands])] == ["nobody listens to /topic"]
+        robot.create_subscription(kind, "topic", lambda _: None, qos)
+        wait_until(lambda: watcher.count_subscribers("topic") == 1)
+        wait_until(lambda: "unknown" not in "".join(f.sentence for f in watch.unread([commands])))
+        sentences = [one.sentence for one in watch.unread([commands])]
+        assert len(sentences) == bool(said)
+        assert all(one.startswith("/robot ") and said in one for one in sentences)
 
 
 class _Logged(list[str]):

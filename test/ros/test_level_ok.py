@@ -270,6 +270,54 @@ def test_an_executor_says_that_nobody_obeys_it(domain: int, peer: Peer, tmp_path
     with NodeProcess("executor_node", domain, tmp_path, parameters):
         peer.connect(Float64MultiArray, "state")
         _warns(peer, "executor", "nobody listens to /command")
+        peer.node.create_subscription(String, "command", lambda _: None, LATCHED)
+        _warns(peer, "executor", "/test_peer requests incompatible QoS on /command")
+
+
+def test_an_executor_says_whom_it_cannot_hear(domain: int, peer: Peer, tmp_path: Path) -> None:
+    path = tmp_path / "tree.json"
+    path.write_text(dumps(READS_X))
+    parameters: dict[str, Any] = {
+        "tree_file": path,
+        "enabled": True,
+        "action_result_topic": "result",
+    }
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        peer.node.create_publisher(String, "action", BEST_EFFORT)
+        peer.node.create_publisher(String, "result", BEST_EFFORT)
+        _warns(
+            peer,
+            "executor",
+            "/test_peer offers incompatible QoS on /action",
+            "/test_peer offers incompatible QoS on /result",
+        )
+
+
+def test_who_uses_simulated_time_says_that_it_has_stopped(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    path = tmp_path / "tree.json"
+    path.write_text(dumps(READS_X))
+    parameters: dict[str, Any] = {"use_sim_time": True, "tree_file": path, "enabled": True}
+    with (
+        NodeProcess("recorder_node", domain, tmp_path, {"use_sim_time": True}),
+        NodeProcess("executor_node", domain, tmp_path, parameters),
+    ):
+        states = peer.connect(Float64MultiArray, "state", subscribers=2)
+        clock = peer.connect(Clock, "/clock", subscribers=2)
+
+        def said() -> bool:
+            clock.publish(Clock(clock=Time(sec=5)))
+            states.publish(Float64MultiArray(data=[0.0, 0.0]))
+            peer.spin_once()
+            told = [
+                one.message
+                for one in peer.diagnostics.values()
+                if one.level == WARN and "/clock has stopped" in one.message
+            ]
+            return len(told) == 2 and any(one.startswith("waiting for /clock") for one in told)
+
+        peer.wait_until(said)
 
 
 @pytest.mark.parametrize(

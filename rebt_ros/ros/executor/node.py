@@ -110,6 +110,7 @@ class ExecutorNode(Node):
             channels,
             self._topics,
             self._driving,
+            self._persons,
             self._intake,
             faults,
             self._watching,

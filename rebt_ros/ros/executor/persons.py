@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from std_msgs.msg import String
 
 from rebt_ros.live.takeover import channel_of
@@ -46,8 +47,11 @@ class Persons:
         self._channels = channels
         self._driving = driving
         self._topics = self._topics_of_robot(settings, commands)
-        for topic in self._takeover_topics:
+        self.subscriptions: Sequence[Subscription] = [
             node.create_subscription(String, topic, partial(self._on_label, topic), _DEPTH)
+            for topic in self._takeover_topics
+        ]
+        """Those of topics of labels."""
 
     def look(self) -> None:
         """Looks at who publishes; to be called every now and then."""

@@ -14,6 +14,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.ros.command_channels import CommandChannels
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
 from rebt_ros.ros.executor.driving import NOVEL, Driving
+from rebt_ros.ros.executor.persons import Persons
 from rebt_ros.ros.executor.robot_commands import RobotCommands
 from rebt_ros.ros.executor.settings import ExecutorSettings
 from rebt_ros.ros.executor.state_topics import StateTopics
@@ -37,6 +38,7 @@ class Reporting:
         channels: What the tree commands.
         topics: What trees read.
         driving: Runs the tree.
+        persons: Hears who takes over.
         intake: Takes trees.
         faults: What went wrong.
         watching: Shows the tree to programs.
@@ -50,6 +52,7 @@ class Reporting:
         channels: CommandChannels,
         topics: StateTopics,
         driving: Driving,
+        persons: Persons,
         intake: TreeIntake,
         faults: Faults,
         watching: Watching,
@@ -59,6 +62,7 @@ class Reporting:
         self._channels = channels
         self._topics = topics
         self._driving = driving
+        self._persons = persons
         self._intake = intake
         self._faults = faults
         self._watching = watching
@@ -153,7 +157,7 @@ class Reporting:
 
         What a disabled executor lacks it may still get before it is enabled.
         """
-        watch, commands, intake = self._watch, self._channels.topics, self._intake
+        watch, channels, intake = self._watch, self._channels, self._intake
         findings = [
             *watch.several(
                 intake.name,
@@ -161,11 +165,12 @@ class Reporting:
                 "chance decides which one drives; name one with the parameter 'learner', or stop "
                 "all but one",
             ),
-            *watch.misfits([intake.documents]),
+            # Whoever takes over must be heard.
+            *watch.misfits([intake.documents, *self._persons.subscriptions]),
             *self._topics.look(),
             *(
                 finding
-                for topic in commands
+                for topic in sorted(channels.topics)
                 for finding in watch.several(topic, "commands", _STOP_OTHERS)
             ),
             *self._without_command(),
@@ -176,8 +181,9 @@ class Reporting:
         if self._driving.enabled:
             findings += [
                 *watch.timeless(),
-                *watch.unheard(self._topics.subscriptions),
-                *watch.unread(commands),
+                *watch.unheard([*self._topics.subscriptions, *channels.results]),
+                *watch.mixed(self._topics.subscriptions),
+                *watch.unread(channels.publishers),
             ]
         return watch.say(findings)
 

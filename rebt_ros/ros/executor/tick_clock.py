@@ -10,6 +10,8 @@ from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 
+from rebt_ros.live.clock_watch import ClockWatch
+
 
 class TickClock:
     """Simulated time where that is used; else a clock that nobody sets.
@@ -20,6 +22,7 @@ class TickClock:
     """
 
     def __init__(self, node: Node, set_back: Callable[[], None]) -> None:
+        self._watch = ClockWatch()
         self._simulated = bool(node.get_parameter("use_sim_time").value)
         self.clock = (
             node.get_clock() if self._simulated else Clock(clock_type=ClockType.STEADY_TIME)
@@ -31,8 +34,8 @@ class TickClock:
 
     @property
     def stands(self) -> bool:
-        """Whether simulated time has not begun."""
-        return self._simulated and self.now() == 0
+        """Whether simulated time has not begun, or has stopped."""
+        return self._simulated and self._watch.stands(self.now(), time.monotonic())
 
     def now(self) -> int:
         """The time, nanoseconds."""

@@ -112,7 +112,8 @@ class RecorderNode(Node):
         self._readers: dict[str, FeatureReader] = {}
         self._categories: dict[str, Categories] = {}
         self._shown = self._listen_to_demonstrator()
-        self._sources = [*self._shown, *self._listen_to_executor()]
+        self._driven = self._listen_to_executor()
+        self._sources = [*self._shown, *self._driven]
         topics = [source.topic_name for source in self._sources]
         if settings.robot is not None:
             topics += map(self.resolve_topic_name, settings.sources)
@@ -384,7 +385,18 @@ class RecorderNode(Node):
         """What in the graph keeps this node from recording."""
         watch = self._watch
         unfit = self._robot.look() if self._robot is not None else []
-        return watch.say([*watch.timeless(), *unfit, *watch.unheard(self._demonstrators)])
+        states = {self.resolve_topic_name(topic.name) for topic in self._settings.state_topics}
+        # With a robot file several nodes may well publish, each a part of the state.
+        plain = [one for one in self._shown if one.topic_name in states]
+        return watch.say(
+            [
+                *watch.timeless(),
+                *unfit,
+                *watch.unheard(self._demonstrators),
+                *watch.mixed(plain),
+                *watch.misfits(self._driven),
+            ]
+        )
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any

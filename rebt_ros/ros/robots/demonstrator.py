@@ -153,8 +153,7 @@ class DemonstratorNode(Node):
     def _report(self) -> Report:
         watch = self._watch
         values = {"enabled": self._enabled, "actions": self._answered, **self._faults.counts}
-        topics = [action.topic_name for action in self._hands.actions]
-        findings = [*watch.unheard(self._hands.states), *watch.unread(topics)]
+        findings = [*watch.unheard(self._hands.states), *watch.unread(self._hands.actions)]
         problems = watch.say(findings if self._enabled else ())
         if self._enabled and self._faults.recent:
             problems.insert(0, self._faults.recent)

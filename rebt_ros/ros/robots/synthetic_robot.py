@@ -194,7 +194,7 @@ class SyntheticRobotNode(Node):
 
     def _report(self) -> Report:
         watch, topics = self._watch, (self._states, self._actions)
-        findings = [*watch.timeless(), *watch.unread(topic.topic_name for topic in topics)]
+        findings = [*watch.timeless(), *watch.unread(topics)]
         problems = watch.say(findings if self._enabled and not self._over else ())
         values = {"enabled": self._enabled, "ticks": self._ticked, "actions": self._done}
         message = self._what_it_does().rstrip(".")
