@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from rebt_ros.storage.recording_files import is_named_so
+from rebt_ros.storage.text import unreadable
 
 #: A recording has ended that nothing was written to for so long (seconds).
 QUIET: Final = 3.0
@@ -26,6 +27,8 @@ class EndedDemonstrations:
         self._directory: Path | None = None
         self._sizes: dict[str, tuple[int, float]] = {}
         self._learned: dict[str, int] = {}
+        self.problem = ""
+        """Why nothing can be counted, without a full stop; empty where it can be."""
 
     def look(self, directory: Path, now: float) -> int:
         """How many demonstrations have ended that nothing was learned from.
@@ -34,6 +37,7 @@ class EndedDemonstrations:
             directory: Of the recordings; another one than before is a first look.
             now: Seconds of a clock that nobody sets.
         """
+        self.problem = _problem(directory)
         found = dict(_sizes(directory))
         with self._lock:
             if directory != self._directory:
@@ -52,6 +56,17 @@ class EndedDemonstrations:
         with self._lock:
             if self._directory is not None:
                 self._learned = dict(_sizes(self._directory))
+
+
+def _problem(directory: Path) -> str:
+    """Why a directory cannot be looked into; it need not be there yet."""
+    try:
+        next(directory.iterdir(), None)
+    except FileNotFoundError:
+        return ""
+    except OSError as err:
+        return str(unreadable(directory, err)).rstrip(".")
+    return ""
 
 
 def _sizes(directory: Path) -> Iterator[tuple[str, int]]:

@@ -27,6 +27,9 @@ _WORKER: Final = "rebt_ros.live.learning_worker"
 #: What asks for the files of what was learned last: their directory, in place of a request.
 _WRITE: Final = "write"
 
+#: What asks for pictures of another tree: their directory, beside the document.
+_DRAW: Final = "draw"
+
 #: How long that may take (seconds): fonts may have to be looked for first.
 _DRAWING: Final = 120.0
 
@@ -161,8 +164,21 @@ class LearningProcess:
         Raises:
             LearningError: It cannot be written, took too long, or the process ended.
         """
+        return self._drawn({_WRITE: str(directory)})
+
+    def draw(self, document: str, directory: Path) -> tuple[str, ...]:
+        """Writes text and pictures of a tree in place of those of what was learned last.
+
+        Returns:
+            Notes on what could not be made; no full stops.
+
+        Raises:
+            LearningError: They cannot be written, took too long, or the process ended.
+        """
+        return self._drawn({_DRAW: str(directory), "document": document})
+
+    def _drawn(self, message: Mapping[str, Any]) -> tuple[str, ...]:
         late = LearningError(f"drawing took longer than {_DRAWING:g} s and was stopped.")
-        message = {_WRITE: str(directory)}
         reply = self._ask(message, threading.Event(), _DRAWING, late, lambda progress: None)
         return tuple(reply["notes"])
 

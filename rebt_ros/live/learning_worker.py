@@ -133,6 +133,8 @@ def _reply(line: bytes, known: Known, tell: Tell) -> dict[str, Any]:
     try:
         message = json.loads(line)
         learned, known.learned = known.learned, None
+        if "draw" in message:
+            return {"notes": draw(message["document"], Path(message["draw"]))}
         if "write" in message:
             return {"notes": write(learned, Path(message["write"])) if learned else []}
         del learned
@@ -168,6 +170,7 @@ def learn(
         RebtError: They cannot be used, or an option makes no sense.
     """
     from rebt_ros.behavior_tree.document import dumps
+    from rebt_ros.demonstration.repeated import repeated
     from rebt_ros.demonstration.schema import FeatureKind
     from rebt_ros.demonstration.table import tabulate
     from rebt_ros.learning import pipeline
@@ -203,6 +206,7 @@ def learn(
     learned = kept.learned
     notes = list(no_recordings(Path(request.demonstrations)))
     notes += [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
+    notes += repeated(demonstrations)
     notes += [note for learning in learnings for note in learning.notes]
     led = {
         f"{learning.table.channel}: " if len(learnings) > 1 else "": learning.report
@@ -278,6 +282,22 @@ def write(learned: Learned, directory: Path) -> tuple[str, ...]:
     before = learned.result.notes
     inputs = [learned.demonstrations]
     return write_files(directory, learned.result, inputs, learned.options).notes[len(before) :]
+
+
+def draw(document: str, directory: Path) -> tuple[str, ...]:
+    """Writes text and pictures of a tree that was not learned just now; returns notes.
+
+    Raises:
+        StorageError: A file cannot be written.
+    """
+    from rebt_ros.behavior_tree.document import loads
+    from rebt_ros.drawing.text import render_text
+    from rebt_ros.offline.level_files import write_tree_pictures
+    from rebt_ros.storage.atomic import write_text_atomically
+
+    learned = loads(document)
+    write_text_atomically(directory / "tree.txt", render_text(learned))
+    return tuple(write_tree_pictures(directory, learned))
 
 
 def _agreement_of(document: str, learnings: Sequence[Learning]) -> float | None:

@@ -11,6 +11,7 @@ from typing import TypeVar
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, unmeasurable
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.repeated import repeated
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.drawing.text import render_text
@@ -101,6 +102,7 @@ def learn(
     paths = as_paths(inputs)
     loaded = load(paths, replace(reading, features=reading.features | frozenset(declared)))
     files = {one.name: path for one, path in zip(loaded.demonstrations, loaded.paths, strict=True)}
+    again = tuple(repeated(loaded.demonstrations))
     tables = tuple(
         replace(table, robot=loaded.robot)
         for table in tabulate(loaded.demonstrations, declared, loaded.weights)
@@ -120,7 +122,7 @@ def learn(
         kept = _ruled(learned, asked, loaded.demonstrations, repair)
         learned, proven = kept.learned, kept.rules
     weights = _weights(tables[0])
-    notes = (*loaded.notes, *_on_weights(weights), *further, *_not_on_a_robot(learned))
+    notes = (*loaded.notes, *again, *_on_weights(weights), *further, *_not_on_a_robot(learned))
     result = OfflineLearning(
         learned,
         learnings,

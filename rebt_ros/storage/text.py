@@ -22,6 +22,10 @@ _UNMARKED = ((1, "utf-16-le"), (0, "utf-16-be"))
 _TELLING = 64
 
 
+#: Files that are no text have a zero byte among so many, as a rule.
+_BINARY = 1024
+
+
 def read_text(path: Path) -> str:
     """The text of a file of UTF-8, UTF-16 or UTF-32, without its byte order mark.
 
@@ -39,11 +43,22 @@ def read_text(path: Path) -> str:
     try:
         text = data.decode(_encoding(data))
     except UnicodeDecodeError as err:
+        if b"\0" in data[:_BINARY]:
+            raise _no_text(path) from err
         line = data.count(b"\n", 0, err.start) + 1
         raise InputError(f"{path}, line {line}: this is not UTF-8 text: save it as UTF-8.") from err
-    if "\0" in text:
-        raise InputError(f"{path} is not a text file: name a file of another kind.")
-    return text
+    if "\0" not in text:
+        return text
+    if "\0" in text.rstrip("\0"):
+        raise _no_text(path)
+    raise InputError(
+        f"{path} ends in zero bytes, as where a machine lost power while it was written: "
+        "remove them with `tr -d '\\0' < FILE > COPY`."
+    )
+
+
+def _no_text(path: Path) -> InputError:
+    return InputError(f"{path} is not a text file: name a file of another kind.")
 
 
 def _encoding(data: bytes) -> str:
@@ -63,4 +78,7 @@ def unreadable(path: Path, err: OSError) -> InputError:
         return InputError(f"{path} does not exist: check its name.")
     if isinstance(err, IsADirectoryError):
         return InputError(f"{path} is a directory: name a file in it.")
+    if isinstance(err, NotADirectoryError):
+        place = next((one for one in [path, *path.parents] if one.is_file()), path)
+        return InputError(f"{place} is a file, not a directory: check its name.")
     return InputError(f"{path} cannot be read ({err.strerror or err}): check its permissions.")

@@ -12,6 +12,10 @@ from rebt_ros.errors import DocumentError, InputError
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.text import read_text, unreadable
 
+#: What a learned tree is called, and how the names of demonstrations end.
+_NAME = "tree.json"
+_DEMONSTRATIONS = frozenset({".csv", ".tsv", ".rec", ".mcap", ".db3"})
+
 #: A character has four bytes at most.
 _LARGEST_FILE = 4 * LARGEST_DOCUMENT
 
@@ -27,11 +31,30 @@ def read_tree(path: Path) -> LearnedTree:
     with contextlib.suppress(OSError, ValueError):
         if path.is_file() and path.stat().st_size > _LARGEST_FILE:
             raise DocumentError(f"{path} has more than {_LARGEST_FILE} bytes: this is no document.")
-    text = read_text(path)
     try:
-        return loads(text)
+        return loads(read_text(path))
+    except InputError as err:
+        raise InputError(_mistaken(path) or str(err)) from err
     except DocumentError as err:
-        raise DocumentError(f"{path}: {err}") from err
+        raise DocumentError(_mistaken(path) or f"{path}: {err}") from err
+
+
+def _mistaken(path: Path) -> str:
+    """What a path names that is no tree, and what to name instead; empty where that is unclear."""
+    try:
+        if path.is_dir() and (path / _NAME).is_file():
+            return f"{path} is a directory: name {path / _NAME}."
+        suffixes = {suffix.lower() for suffix in path.suffixes}
+        is_bag = path.is_dir() and (path / "metadata.yaml").is_file()
+        is_demonstration = path.is_file() and bool(suffixes & _DEMONSTRATIONS)
+    except (OSError, ValueError):
+        return ""
+    if not is_bag and not is_demonstration:
+        return ""
+    return (
+        f"{path} is a demonstration, and no tree: name the {_NAME} that was learned; where "
+        "demonstrations are named as well, the tree comes first."
+    )
 
 
 def find_tree(path: Path) -> LearnedTree | None:

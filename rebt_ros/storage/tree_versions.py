@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from rebt_ros.errors import InputError
+from rebt_ros.errors import InputError, RebtError
 from rebt_ros.storage.atomic import StorageError, write_text_atomically
 from rebt_ros.storage.text import read_text
 
@@ -71,14 +71,21 @@ class TreeVersions:
                 place, and nothing is changed.
 
         Raises:
-            InputError: There is none before it, or it cannot be read.
+            InputError: There is none before it, or it cannot be read or is not accepted.
             StorageError: The newest one cannot be taken out.
         """
         numbered = self._numbered()
         if len(numbered) < 2:
             raise InputError(f"there is no tree before this one in {self._directory}.")
-        document = read_text(numbered[-2])
-        accept(document)
+        try:
+            document = read_text(numbered[-2])
+            accept(document)
+        except StorageError:
+            raise
+        except RebtError as err:
+            raise InputError(
+                f"{numbered[-2]} is not published again: {err} To go back further, remove it."
+            ) from err
         try:
             numbered[-1].rename(numbered[-1].with_suffix(f"{_SUFFIX}{_UNDONE}"))
         except OSError as err:

@@ -56,3 +56,15 @@ def test_what_is_no_recording_or_gone_does_not_count(tmp_path: Path) -> None:
     assert ended.look(tmp_path, 1.0 + QUIET) == 1
     (tmp_path / "one.rec").unlink()
     assert ended.look(tmp_path, 2.0 + QUIET) == 0
+
+
+def test_what_cannot_be_looked_into_is_said(tmp_path: Path) -> None:
+    ended = EndedDemonstrations()
+    ended.look(tmp_path / "not there yet", 0.0)
+    assert ended.problem == ""
+    (tmp_path / "file").write_text("")
+    for path in (tmp_path / "file", tmp_path / "file" / "below"):
+        assert ended.look(path, 1.0) == 0
+        assert ended.problem == f"{tmp_path / 'file'} is a file, not a directory: check its name"
+    ended.look(tmp_path, 2.0)
+    assert ended.problem == ""

@@ -7,6 +7,7 @@ import json
 import os
 import resource
 import signal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +26,21 @@ from rebt_ros.behavior_tree.document import loads
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
+from rebt_ros.drawing.svg import render_svg
 from rebt_ros.storage.recording import RecordingWriter
 from rebt_ros.storage.tree_file import read_tree
 
 FEATURES = (Feature("x", topic="state", index=0), Feature("y", topic="state", index=1))
 
 
-def _record(directory: Path, rows: int = 60, actions: tuple[str, ...] = ("go", "turn")) -> None:
+def _record(
+    directory: Path,
+    rows: int = 60,
+    actions: tuple[str, ...] = ("go", "turn"),
+    features: tuple[Feature, ...] = FEATURES,
+) -> None:
     """A demonstration in which x decides between two actions."""
-    with RecordingWriter(directory, FEATURES, ["action"]) as writer:
+    with RecordingWriter(directory, features, ["action"]) as writer:
         for step in range(rows):
             x = float(step % 10)
             action = actions[x > 4 and len(actions) > 1]
@@ -461,7 +468,7 @@ def test_the_tree_before_is_published_again_on_request(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
     _record(tmp_path / "demonstrations")
-    with NodeProcess("learner_node", domain, tmp_path):
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
         heard = peer.listen(String, "behavior_tree", LATCHED)
         assert not peer.call("/learner/rollback").success
         assert peer.call("/learner/relearn").success
@@ -475,6 +482,9 @@ def test_the_tree_before_is_published_again_on_request(
         _latest(peer, heard, 3)
         assert heard[2].data == heard[0].data
         assert (tmp_path / "learned" / "tree.json").read_text() == heard[0].data
+        learner.says("are of the published tree")
+        drawn = (tmp_path / "learned" / "tree.svg").read_text(encoding="utf-8")
+        assert drawn == render_svg(loads(heard[0].data))
         assert not peer.call("/learner/rollback").success
 
 
@@ -496,6 +506,13 @@ def test_a_tree_that_agrees_too_little_is_held_back_with_the_reason(
         assert "the tree before it stays" in answer.message
         _status(peer, "min_agreement")
         assert len(heard) == 2
+        # What a tree of other features would do in these rows, nobody can tell.
+        renamed = tuple(replace(feature, name=f"other {feature.name}") for feature in FEATURES)
+        _record(tmp_path / "others", features=renamed)
+        _set(peer, min_agreement=0.0, demonstrations=str(tmp_path / "others"))
+        answer = peer.call("/learner/relearn")
+        assert answer.success, answer.message
+        assert "keep_if_better had no say" in answer.message
 
 
 def test_a_relearn_writes_what_learn_writes_and_a_robot_in_a_namespace_has_its_own_directories(

@@ -35,7 +35,7 @@ from rebt_ros.live.learning_process import (
 from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
-from rebt_ros.ros.graph_watch import GraphWatch
+from rebt_ros.ros.graph_watch import Finding, GraphWatch
 from rebt_ros.ros.learner.settings import declare_settings
 from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.tree_file import find_tree
@@ -83,6 +83,7 @@ class LearnerNode(Node):
         self._watch = GraphWatch(self)
         self._settings = declare_settings(self)
         self._ended = EndedDemonstrations()
+        self._uncounted = ""
         self._count_ended()
         # On the second one an executor follows this learner, whoever else publishes trees.
         self._tree_publishers = [
@@ -133,12 +134,14 @@ class LearnerNode(Node):
     def _count_ended(self) -> int:
         """How many demonstrations have ended that nothing was learned from, if that matters."""
         if not self._settings.relearn_after():
+            self._uncounted = ""
             return 0
         try:
-            return self._ended.look(self._settings.demonstrations(), time.monotonic())
-        except RebtError:
-            # A directory that makes no sense is told by ~/relearn.
-            return 0
+            count = self._ended.look(self._settings.demonstrations(), time.monotonic())
+            self._uncounted = self._ended.problem
+        except RebtError as err:
+            count, self._uncounted = 0, str(err).rstrip(".")
+        return count
 
     def _relearn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         call = _Call()
@@ -200,6 +203,12 @@ class LearnerNode(Node):
             self.get_logger().warning(f"{note}.")
         learned = loads(lesson.document)
         self._hold_back(lesson)
+        unjudged = (
+            " keep_if_better had no say: the published tree cannot be judged on these rows, "
+            "because it is about other features or channels, or none were held out."
+            if request.published and lesson.rival is None
+            else ""
+        )
         with self._lock:
             if call.cancelled.is_set():
                 raise LearningCancelledError
@@ -207,7 +216,9 @@ class LearnerNode(Node):
         self._put_out(path, learned, lesson.document, lesson.figures)
         # Nobody has to wait for pictures.
         threading.Thread(target=self._write_files, args=[path.parent], daemon=True).start()
-        return f"{lesson.sentence} It is published and in {path}.{_in_short(lesson.notes)}"
+        return (
+            f"{lesson.sentence} It is published and in {path}.{unjudged}{_in_short(lesson.notes)}"
+        )
 
     def _write_files(self, directory: Path) -> None:
         """Writes what the command `learn` writes."""
@@ -269,11 +280,30 @@ class LearnerNode(Node):
                 return response
             self._figures = {}
             self._publish(learned, document)
+        self._draw(document)
         response.success = True
         response.message = f"published the tree before, {path}."
         self._last = Report(Level.OK, response.message)
         self.get_logger().info(response.message)
         return response
+
+    def _draw(self, document: str) -> None:
+        """Draws a tree that was not learned just now; nobody has to wait for it."""
+        directory = self._settings.output()
+
+        def draw() -> None:
+            try:
+                self._process.draw(document, directory)
+            except LearningError as err:
+                if self.context.ok():
+                    self.get_logger().warning(f"the published tree was not drawn: {err}")
+                return
+            self.get_logger().info(
+                f"the pictures in {directory.absolute()} are of the published tree; summary.json "
+                "and the decision tree are of what was learned last."
+            )
+
+        threading.Thread(target=draw, daemon=True).start()
 
     def _put_in_place(self, document: str) -> None:
         """Makes a tree that was published before the one on disk.
@@ -310,6 +340,7 @@ class LearnerNode(Node):
             learned = self._keeping_rules(loads(document))
             path = self._settings.output() / _TREE_FILE
             version = self._put_out(path, learned, document, {})
+        self._draw(document)
         said = f"published a proposed tree of {nodes.size(learned.tree)} nodes, {version}."
         self._last = Report(Level.OK, said)
         return version.stem, said
@@ -407,7 +438,8 @@ class LearnerNode(Node):
             "trees",
             "executors without a parameter 'learner' follow one by chance; stop all but one",
         )
-        problems = self._watch.say(several)
+        uncounted = [Finding(self._uncounted, waits=False)] if self._uncounted else []
+        problems = self._watch.say([*several, *uncounted])
         if problems:
             return Report(Level.WARN, "; ".join((self._last.message, *problems)), values)
         return Report(self._last.level, self._last.message, values)

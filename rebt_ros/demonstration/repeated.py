@@ -1,0 +1,85 @@
+"""Rows that several demonstrations hold, as where two recorders heard the same messages."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rebt_ros.arrays import IntArray
+from rebt_ros.demonstration.demonstration import Demonstration
+
+#: Two demonstrations with more of their rows in common are the same one (share of the shorter one).
+_SAME: Final = 0.5
+#: Fewer rows in common do not tell.
+_FEWEST: Final = 5
+#: Stamps below are positions of rows, which tables of other demonstrations have as well (ns).
+_FIRST_TIME: Final = 1_000_000_000
+#: Of more rows than this only a part is looked at.
+_MOST: Final = 500_000
+#: So many pairs are named.
+_NAMED: Final = 5
+
+#: Spreads numbers over all that there are.
+_ODD: Final = np.uint64(0x9E3779B97F4A7C15)
+
+Hashes = NDArray[np.uint64]
+
+
+def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
+    """Notes on pairs of demonstrations that hold the same rows at the same times.
+
+    Args:
+        demonstrations: All that are learned from; those without times are not looked at.
+    """
+    part = sum(len(one.stamps) for one in demonstrations) // _MOST + 1
+    hashes = [_hashes(one, part) for one in demonstrations]
+    owner = np.repeat(np.arange(len(hashes)), [len(one) for one in hashes])
+    shared = _shared(np.concatenate([*hashes, np.zeros(0, np.uint64)]), owner)
+    found = [
+        (first, second, rows)
+        for (first, second), rows in sorted(shared.items())
+        if rows >= max(_FEWEST, _SAME * min(len(hashes[first]), len(hashes[second])))
+    ]
+    for first, second, rows in found[:_NAMED]:
+        names = f"{demonstrations[first].name} and {demonstrations[second].name}"
+        count = rows if part == 1 else f"about {rows * part}"
+        yield f"{names} share {count} rows, which count twice: leave one of them out"
+    if (more := len(found) - _NAMED) > 0:
+        yield f"{more} more pairs of demonstrations share rows"
+
+
+def _hashes(demonstration: Demonstration, part: int) -> Hashes:
+    """A number for each different row, or for one in so many; empty where there are no times."""
+    stamps = demonstration.stamps
+    if not len(stamps) or int(stamps.min()) < _FIRST_TIME:
+        return np.zeros(0, np.uint64)
+    mixed = stamps.astype(np.uint64)
+    for column in _columns(demonstration):
+        mixed = (mixed ^ column) * _ODD
+        mixed ^= mixed >> np.uint64(29)
+    return np.unique(mixed[mixed % np.uint64(part) == 0])
+
+
+def _columns(demonstration: Demonstration) -> Iterator[Hashes]:
+    """What is in the rows beside stamps, column by column."""
+    yield _texts(demonstration.actions)[demonstration.chosen]
+    yield _texts(demonstration.channels)[demonstration.channel]
+    for values in demonstration.states.T:
+        # The sum is of the same bits for both zeros.
+        yield (values + 0.0).view(np.uint64)
+
+
+def _texts(texts: Sequence[str]) -> Hashes:
+    return np.array([hash(text) & 0xFFFFFFFFFFFFFFFF for text in texts], np.uint64)
+
+
+def _shared(hashes: Hashes, owner: IntArray) -> Counter[tuple[int, int]]:
+    """How many rows the first two demonstrations that hold a row have in common, pair by pair."""
+    order = np.argsort(hashes, kind="stable")
+    hashes, owner = hashes[order], owner[order]
+    again = np.flatnonzero(hashes[1:] == hashes[:-1])
+    return Counter(zip(owner[again].tolist(), owner[again + 1].tolist(), strict=True))
