@@ -27,14 +27,38 @@ from rebt_ros.demonstration.schema import Feature, FeatureKind
 
 #: Words for a value that is not there, in lower case.
 _MISSING = frozenset(
-    {"", "na", "n/a", "n.a.", "#n/a", "#na", "<na>", "nan", "nat", "null", "-", "--", "?"}
+    {
+        "",
+        "na",
+        "n/a",
+        "n.a.",
+        "#n/a",
+        "#na",
+        "#nv",
+        "#n/d",
+        "<na>",
+        "nan",
+        "nat",
+        "null",
+        "-",
+        "--",
+        "?",
+    }
 )
 #: Words for it, among numbers and truths; among texts they may be texts as well.
 _MAYBE_MISSING = frozenset({"none", "nil", "missing", "unknown", "undefined"})
 
+#: What spreadsheets write where a formula fails, in whatever language, or a cell is too narrow.
+_FAILED = re.compile(r"#(?:[^\W\d_][\w/ -]*[!?]|#+)|Err:\d{3}")
+
+#: Also as spreadsheets in other languages write them.
+_TRUE = (
+    "true yes on t y 1 1.0 wahr ja vrai oui verdadero sí vero verdadeiro sim waar sant prawda tak"
+)
+_FALSE = "false no off f n 0 0.0 falsch nein faux non falso não onwaar nee falskt nej fałsz nie"
 _TRUTH = {
-    **dict.fromkeys(("true", "yes", "on", "t", "y", "1", "1.0"), 1.0),
-    **dict.fromkeys(("false", "no", "off", "f", "n", "0", "0.0"), 0.0),
+    **dict.fromkeys(_TRUE.split(), 1.0),
+    **dict.fromkeys(_FALSE.split(), 0.0),
 }
 
 #: Words of truth that no column is called.
@@ -46,12 +70,14 @@ _SEPARATORS = "[ ,'\u2019\u00a0\u202f]"
 _MINUS = "\u2212"
 _THOUSANDS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{_SEPARATORS}\d{{3}})+(?:\.\d+)?")
 #: Points between them, where they cannot be decimal points: several, or by what other columns say.
-_POINTED = re.compile(r"[+-]?\d{1,3}(?:\.\d{3}){2,}")
-_MAYBE_POINTED = re.compile(r"[+-]?\d{1,3}(?:\.\d{3})*")
+_POINTED = re.compile(r"[+-]?[1-9]\d{0,2}(?:\.\d{3}){2,}")
+_MAYBE_POINTED = re.compile(r"[+-]?(?:0|[1-9]\d{0,2}(?:\.\d{3})*)")
 _DECIMAL_COMMA = re.compile(r"[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*),\d+(?:[eE][+-]?\d+)?")
 _UNIT = re.compile(
     r"(?P<number>[^A-Za-z°µμΩ%]*\d[eE][+-]?\d+|[^A-Za-z°µμΩ%]*\d\.?) ?(?P<unit>\D.*)"
 )
+#: What has digits, and no letters before them.
+_AMOUNT = re.compile(r"[^A-Za-z\d]*\d.*")
 _MONTH = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*\.?"
 _DATE = (
     r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d{2})"
@@ -69,6 +95,11 @@ _FEW_TEXTS, _RECURRING = 20, 0.5
 #: Nor more texts than that: each is an indicator of as many cells as there are rows.
 _MOST_TEXTS = 1000
 _LONGEST_UNIT = 12
+#: A number stands in for none where it is so often there, beside so many others, and so many times
+#: as far from the next as they are from each other and from zero.
+_FEWEST_STAND_INS, _FEWEST_OTHERS, _FAR = 2, 5, 3.0
+#: The largest and smallest integers of 16 and 32 bits.
+_LARGEST = frozenset({32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0, 4294967295.0})
 #: Every integer up to here is a number of its own.
 _LARGEST_EXACT = 2.0**53
 #: Of the largest number that is learned from.
@@ -99,6 +130,15 @@ class NoFeature:
 def is_missing(cell: str) -> bool:
     """Whether a cell, without blanks around it, says that there is no value."""
     return cell.lower() in _MISSING
+
+
+def is_failed(cell: str) -> bool:
+    """Whether a cell, without blanks around it, says that a formula of a spreadsheet failed.
+
+    >>> [is_failed(cell) for cell in ("#DIV/0!", "#WERT!", "#####", "Err:502", "#1", "#red")]
+    [True, True, True, True, False, False]
+    """
+    return _FAILED.fullmatch(cell) is not None
 
 
 def is_maybe_missing(cell: str) -> bool:
@@ -176,6 +216,14 @@ def column(
         return (_grouped(name, cells) if decimal_commas else None) or _numeric(
             name, plain, *_rounded(name, cells, plain)
         )
+    failed = set(filter(is_failed, set(cells)))
+    if failed:
+        note = f"cells of column {name!r} that say {min(failed)!r} are missing values"
+        filled = ["" if cell in failed else cell for cell in cells]
+        others = column(name, filled, line, decimal_commas=decimal_commas)
+        if isinstance(others, NoFeature):
+            return others
+        return replace(others, notes=(*others.notes, note))
     distinct = set(cells) - {""}
     if all(map(_MOMENT.fullmatch, distinct)):
         return NoFeature(f"column {name!r} holds dates or times and is no feature")
@@ -209,7 +257,36 @@ def _amounts(
 
 def _numeric(name: str, values: FloatArray, *notes: str, decimal_commas: bool = False) -> Column:
     empty = (f"column {name!r} is empty",) if np.isnan(values).all() else ()
-    return Column(Feature(name), values, (*notes, *empty), decimal_commas)
+    stand_ins = [
+        f"column {name!r} holds {number:.17g} {count} times, far from all else: it is read as a "
+        "number; leave the cell empty if it says that there is no value"
+        for number, count in _stand_ins(values)
+    ]
+    return Column(Feature(name), values, (*notes, *empty, *stand_ins), decimal_commas)
+
+
+def _stand_ins(values: FloatArray) -> Iterable[tuple[float, int]]:
+    """Numbers that people write where there is none, such as -999, and how often they do."""
+    kept = values[np.isfinite(values)]
+    for number in (kept.min(initial=0.0), kept.max(initial=0.0)):
+        others = kept[kept != number]
+        if not _is_stand_in(abs(float(number))) or len(kept) - len(others) < _FEWEST_STAND_INS:
+            continue
+        if len(np.unique(others)) < _FEWEST_OTHERS:
+            continue
+        distance = np.abs(others - number).min()
+        if distance > _FAR * max(np.ptp(others), np.abs(others).max()):
+            yield float(number), len(kept) - len(others)
+
+
+def _is_stand_in(number: float) -> bool:
+    """Whether a number is one of those: nines, a power of ten, or the largest of its type."""
+    digits = f"{number:.0f}"
+    return number >= 99 and (
+        (number < _LARGEST_EXACT and number == int(number) and set(digits) == {"9"})
+        or (number >= 1e5 and f"{number:e}".startswith("1.000000e"))
+        or number in _LARGEST
+    )
 
 
 def _rounded(name: str, cells: Sequence[str], values: FloatArray) -> Iterable[str]:
@@ -331,7 +408,12 @@ def _texts(
     values = codes(("", *categories), cells).astype(np.float64) - 1
     values[values < 0] = np.nan
     notes: tuple[str, ...] = ()
-    if any(map(is_number, categories)):
+    if categories and all(map(_AMOUNT.fullmatch, categories)):
+        notes = (
+            f"column {name!r} is taken as text, not as numbers: its cells, such as "
+            f"{categories[0]!r}, are not all numbers written in the same way",
+        )
+    elif any(map(is_number, categories)):
         text = next(cell for cell in categories if not is_number(cell))
         notes = (
             f"column {name!r} is taken as text, not as numbers, because line "

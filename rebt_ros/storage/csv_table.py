@@ -29,6 +29,7 @@ from rebt_ros.storage.cells import (
     NoFeature,
     codes,
     column,
+    is_failed,
     is_maybe_missing,
     is_missing,
     is_number,
@@ -295,7 +296,7 @@ class _Shown:
     def events(self) -> tuple[IntArray, IntArray]:
         """Where each action stands, row by row: positions in `rows` and in `table.labels`."""
         filled = [
-            [not is_missing(cell.strip()) for cell in self.cells[one]] for one in self.table.labels
+            [not _is_no_action(cell) for cell in self.cells[one]] for one in self.table.labels
         ]
         taken, label = np.nonzero(np.array(filled).T)
         return taken.astype(np.int64), label.astype(np.int64)
@@ -431,7 +432,7 @@ def _labelled(table: _Table, notes: list[str]) -> list[int]:
     count = len(table.rows)
     for label in table.labels:
         name = table.columns[label]
-        empty = sum(is_missing(cells[label].strip()) for cells in table.rows)
+        empty = sum(_is_no_action(cells[label]) for cells in table.rows)
         if empty == count:
             raise InputError(
                 f"{table.path}: column {name!r} holds no action: name the column that does."
@@ -448,8 +449,13 @@ def _labelled(table: _Table, notes: list[str]) -> list[int]:
     return [
         row
         for row, cells in enumerate(table.rows)
-        if not all(is_missing(cells[label].strip()) for label in table.labels)
+        if not all(_is_no_action(cells[label]) for label in table.labels)
     ]
+
+
+def _is_no_action(cell: str) -> bool:
+    cell = cell.strip()
+    return is_missing(cell) or is_failed(cell)
 
 
 def _outcomes(table: _Table, notes: list[str]) -> set[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import dropwhile, islice
 
@@ -96,8 +96,8 @@ def _last_comment(comments: str, delimiter: str) -> tuple[str, ...]:
 def _delimiter(text: str) -> str:
     """The one that gives all records as many cells as the first.
 
-    Where none does, titles above the table, which have a single cell, do not count; then most
-    records do; and then it is commas.
+    Where none does, the names may lack that of the first column; then titles above the table, which
+    have a single cell, do not count; then most records do; and then it is commas.
 
 
     A table with semicolons may have a decimal comma in each cell, so that commas would do as well:
@@ -105,9 +105,10 @@ def _delimiter(text: str) -> str:
     """
     fitting = [one for one in _DELIMITERS if _fits(text, one)]
     if not fitting:
+        one_less = [one for one in _DELIMITERS if _lacks_a_name(_counts(text, one))]
         below_titles = [one for one in _DELIMITERS if _fits(text, one, titles=True)]
         mostly = [one for one in _DELIMITERS if one != " " and _fits_most(text, one)]
-        return next(iter([*below_titles, *mostly, ","]))
+        return next(iter([*one_less, *below_titles, *mostly, ","]))
     if fitting[0] == ",":
         first = next(_first_records(text, ","))
         others = [one for one in fitting[1:] if one != " " and any(one in cell for cell in first)]
@@ -120,6 +121,10 @@ def _fits(text: str, delimiter: str, *, titles: bool = False) -> bool:
     if titles:
         counts = list(dropwhile(lambda count: count == 1, counts))
     return len(set(counts)) == 1 and min(counts) > 1
+
+
+def _lacks_a_name(counts: Sequence[int]) -> bool:
+    return len(counts) > 1 and counts[0] > 1 and set(counts[1:]) == {counts[0] + 1}
 
 
 def _fits_most(text: str, delimiter: str) -> bool:

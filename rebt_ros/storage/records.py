@@ -12,7 +12,7 @@ from enum import Enum
 from pathlib import Path
 
 from rebt_ros.errors import InputError
-from rebt_ros.storage.cells import is_missing, is_number
+from rebt_ros.storage.cells import is_failed, is_missing, is_number
 from rebt_ros.storage.dialect import COMMENT, Dialect, dialect_of
 from rebt_ros.storage.text import read_text
 
@@ -102,6 +102,10 @@ def read_records(path: Path) -> Records:
     left_out = Counter(reason for reason in reasons if reason is not None)
     left_out[NoRow.EMPTY] += sum(map(bool, rows)) - len(filled)
     rows = _without_blank_ends([rows[place] for place in kept])
+    notes = dialect.notes
+    if _lacks_a_name(rows):
+        rows[0] = ["", *rows[0]]
+        notes += ("the first column has no name, as where R writes the names of rows",)
     if len(rows[0]) < 2:
         raise InputError(
             f"{path} has a single column: a table needs at least one value of the state and "
@@ -113,7 +117,7 @@ def read_records(path: Path) -> Records:
         array("q", (lines[place] for place in kept)),
         dialect.comment,
         +left_out,
-        dialect.notes,
+        notes,
         dialect.delimiter,
     )
 
@@ -126,7 +130,7 @@ def _no_rows(records: Sequence[Sequence[str]]) -> list[NoRow | None]:
     reasons: list[NoRow | None] = [NoRow.TITLE] * titles
     for place, cells in enumerate(records[titles:]):
         reason = None
-        if cells[0].startswith(COMMENT) and place and (len(cells) != width or numbered):
+        if _is_comment(cells[0]) and place and (len(cells) != width or numbered):
             reason = NoRow.COMMENT
         elif place and all(_RULED.fullmatch(cell.strip()) for cell in cells):
             reason = NoRow.RULER
@@ -150,9 +154,14 @@ def _titles(records: Sequence[Sequence[str]]) -> int:
 
 def _numbered(records: Sequence[Sequence[str]]) -> bool:
     """Whether the first column holds numbers, so that what begins like a comment is one."""
-    cells = {cells[0].strip() for cells in records if not cells[0].startswith(COMMENT)}
+    cells = {cells[0].strip() for cells in records if not _is_comment(cells[0])}
     filled = [cell for cell in cells if not is_missing(cell)]
     return bool(filled) and all(map(is_number, filled))
+
+
+def _is_comment(cell: str) -> bool:
+    """Whether a record whose first cell this is may be a comment."""
+    return cell.startswith(COMMENT) and not (is_failed(cell.strip()) or is_missing(cell.strip()))
 
 
 def _says_units(cells: Sequence[str]) -> bool:
@@ -173,6 +182,17 @@ def _without_blank_ends(rows: Sequence[list[str]]) -> list[list[str]]:
         cells[:width] if len(cells) > width and not any(map(str.strip, cells[width:])) else cells
         for cells in rows
     ]
+
+
+def _lacks_a_name(rows: Sequence[Sequence[str]]) -> bool:
+    """Whether all rows begin with a name or number of their own, for which there is no name."""
+    width = len(rows[0]) + 1
+    if width < 3 or len(rows) < 3 or any(len(cells) != width for cells in rows[1:]):
+        return False
+    own = [cells[0].strip() for cells in rows[1:]]
+    if own == [str(number) for number in range(1, len(rows))]:
+        return True
+    return len(set(own)) == len(own) and not any(map(is_number, own))
 
 
 def _parsed(path: Path, text: str, dialect: Dialect) -> tuple[list[list[str]], array[int]]:

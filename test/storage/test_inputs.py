@@ -262,7 +262,7 @@ def test_a_tree_that_may_be_missing_is_found_or_refused(tmp_path):
         find_tree(path)
     with pytest.raises(InputError, match="is a directory"):
         find_tree(tmp_path)
-    with pytest.raises(InputError, match="Not a directory"):
+    with pytest.raises(InputError, match="is a file, not a directory"):
         find_tree(path / "tree.json")
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is no regular file"):

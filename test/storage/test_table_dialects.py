@@ -98,6 +98,26 @@ DIALECTS: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
         _written(_each(lambda column, cell: {"True": "yes", "False": "no"}.get(cell, cell))),
         (),
     ),
+    "truths of a German spreadsheet": (
+        _written(_each(lambda column, cell: {"True": "WAHR", "False": "FALSCH"}.get(cell, cell))),
+        (),
+    ),
+    "truths of a French spreadsheet": (
+        _written(_each(lambda column, cell: {"True": "VRAI", "False": "FAUX"}.get(cell, cell))),
+        (),
+    ),
+    "R's write.table": (
+        "\n".join(
+            [" ".join(f'"{name}"' for name in NAMES)]
+            + [f'"{place}" {" ".join(row)}' for place, row in enumerate(_plain(), 1)]
+        )
+        + "\n",
+        ("blanks", "as where R writes the names of rows", "'Unnamed: 0' numbers or dates the rows"),
+    ),
+    "R's write.csv with names of rows": (
+        _written([[f"run {place}", *row] for place, row in enumerate(_plain())], NAMES),
+        ("as where R writes the names of rows", "'Unnamed: 0' numbers or dates the rows"),
+    ),
     "zeros and ones": (
         _written(_each(lambda column, cell: {"True": "1", "False": "0"}.get(cell, cell))),
         (),
@@ -297,6 +317,58 @@ def test_numbers_are_read_as_people_write_them(
 def test_what_is_written_in_several_ways_is_text(cells: list[str], tmp_path: Path) -> None:
     read = _read(tmp_path, _written([[cell, "go"] for cell in cells], ["x", "a"]))
     assert read.demonstration.features[0].categories == tuple(sorted(cells))
+    said = any("is taken as text, not as numbers" in note for note in read.notes)
+    assert said == (cells != ["a1", "a2"])
+
+
+def test_a_point_behind_a_zero_parts_no_thousands(tmp_path: Path) -> None:
+    read = _read(tmp_path, "dist;load;a\n1.250;0,5;go\n0.750;12,25;turn\n")
+    assert read.demonstration.states.tolist() == [[1.25, 0.5], [0.75, 12.25]]
+
+
+@pytest.mark.parametrize("cell", ["#DIV/0!", "#WERT!", "#NAME?", "#NV", "########", "Err:502"])
+@pytest.mark.parametrize("column", [0, 2, 3, 4])
+def test_formulas_that_failed_are_missing_values_and_no_comments(
+    cell: str, column: int, tmp_path: Path
+) -> None:
+    rows = _plain()
+    for place in (7, 11):
+        rows[place][column] = cell
+    read = _read(tmp_path, _written(rows))
+    plain = _read(tmp_path, _written(_plain())).demonstration
+    assert read.demonstration.features == plain.features
+    assert read.account is not None
+    if column == 4:
+        assert read.notes == ("2 of 60 rows have no action and are left out",)
+        assert read.account.left_out == {"have no action": 2}
+        return
+    assert np.argwhere(np.isnan(read.demonstration.states)).tolist() == [[7, column], [11, column]]
+    # In all languages #N/A says that there is no value, not that something has failed.
+    said = [f"cells of column {NAMES[column]!r} that say {cell!r} are missing values"]
+    assert list(read.notes) == ([] if cell == "#NV" else said)
+
+
+@pytest.mark.parametrize(
+    ("stand_in", "others", "noted"),
+    [
+        ("-999", "{:.2f}", True),
+        ("9999.0", "{:.2f}", True),
+        ("1e30", "{:.2f}", True),
+        ("-2147483648", "{:.0f}", True),
+        # The largest range of a scanner, a round number, and one like the others.
+        ("30.0", "{:.2f}", False),
+        ("1000", "{:.2f}", False),
+        ("999", "{:.0f}00", False),
+    ],
+)
+def test_a_number_that_may_stand_for_none_is_noted_and_stays(
+    stand_in: str, others: str, noted: bool, tmp_path: Path
+) -> None:
+    cells = [stand_in if place % 5 == 4 else others.format(place / 4) for place in range(40)]
+    rows = [[cell, ("go", "turn")[place % 2]] for place, cell in enumerate(cells)]
+    read = _read(tmp_path, _written(rows, ["x", "action"]))
+    assert read.demonstration.states[:, 0].tolist() == list(map(float, cells))
+    assert ["8 times, far from all else" in note for note in read.notes] == [True] * noted
 
 
 @pytest.mark.parametrize(
