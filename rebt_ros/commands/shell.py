@@ -58,8 +58,19 @@ def run(command: Callable[[], None], name: str) -> None:
     except OSError as error:
         if error.filename is not None:
             _fail(f"{name}: {error.filename} cannot be used ({error.strerror}).")
+        if _is_nowhere():
+            _fail(f"{name}: the current directory is not there any more: change to another one.")
         streams.drop(sys.stdout)
         _fail(f"{name}: the output cannot be written ({error.strerror or error}).")
+
+
+def _is_nowhere() -> bool:
+    """Whether somebody has removed the directory that relative paths begin in."""
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def _fail(sentence: str) -> None:

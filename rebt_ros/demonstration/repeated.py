@@ -18,6 +18,8 @@ _SAME: Final = 0.5
 _FEWEST: Final = 5
 #: Stamps below are positions of rows, which tables of other demonstrations have as well (ns).
 _FIRST_TIME: Final = 1_000_000_000
+#: Of demonstrations without times, fewer do not tell either.
+_FEWEST_IN_ALL: Final = 20
 #: Of more rows than this only a part is looked at.
 _MOST: Final = 500_000
 #: So many pairs are named.
@@ -33,8 +35,10 @@ def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
     """Notes on pairs of demonstrations that hold the same rows at the same times.
 
     Args:
-        demonstrations: All that are learned from; those without times are not looked at.
+        demonstrations: All that are learned from; those without times must have all rows in
+            common, as many tables have some at the same positions.
     """
+    tell_time = [len(one.stamps) and one.stamps.min() >= _FIRST_TIME for one in demonstrations]
     part = sum(len(one.stamps) for one in demonstrations) // _MOST + 1
     hashes = [_hashes(one, part) for one in demonstrations]
     owner = np.repeat(np.arange(len(hashes)), [len(one) for one in hashes])
@@ -43,6 +47,7 @@ def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
         (first, second, rows)
         for (first, second), rows in sorted(shared.items())
         if rows >= max(_FEWEST, _SAME * min(len(hashes[first]), len(hashes[second])))
+        if tell_time[first] or rows == len(hashes[first]) == len(hashes[second]) >= _FEWEST_IN_ALL
     ]
     for first, second, rows in found[:_NAMED]:
         names = f"{demonstrations[first].name} and {demonstrations[second].name}"
@@ -53,11 +58,8 @@ def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
 
 
 def _hashes(demonstration: Demonstration, part: int) -> Hashes:
-    """A number for each different row, or for one in so many; empty where there are no times."""
-    stamps = demonstration.stamps
-    if not len(stamps) or int(stamps.min()) < _FIRST_TIME:
-        return np.zeros(0, np.uint64)
-    mixed = stamps.astype(np.uint64)
+    """A number for each different row, or for one in so many."""
+    mixed = demonstration.stamps.astype(np.uint64)
     for column in _columns(demonstration):
         mixed = (mixed ^ column) * _ODD
         mixed ^= mixed >> np.uint64(29)

@@ -67,9 +67,12 @@ def _named_so(directory: Path) -> list[Path]:
 def is_recording(path: Path) -> bool:
     """Whether a file begins like a recording.
 
-    One whose recorder was killed before it had written what comes before the rows does not.
+    One whose recorder was killed before it had written what comes before the rows does not.  What
+    is read from a pipe is gone, so that nobody looks into one.
     """
     try:
+        if not path.is_file():
+            return False
         with path.open("rb") as file:
             return file.read(len(MARK)) == MARK and file.readline(LONGEST_LINE).endswith(b"\n")
     except OSError:

@@ -49,11 +49,17 @@ def test_rows_that_differ_are_no_rows_in_common(what: str) -> None:
         "stamps": replace(one, stamps=one.stamps + 1),
         "states": replace(one, states=one.states + 0.5),
         "chosen": replace(one, chosen=1 - one.chosen),
-        # All tables have the same positions.
-        "positions": replace(one, stamps=np.arange(50)),
+        # Tables have the same positions, but for one row.
+        "positions": replace(one, stamps=np.arange(50), chosen=one.chosen ^ (np.arange(50) == 7)),
     }[what]
-    first = other if what == "positions" else one
+    first = replace(one, stamps=np.arange(50)) if what == "positions" else one
     assert list(repeated([first, replace(other, name="b")])) == []
+
+
+def test_copies_of_a_table_are_noticed() -> None:
+    table = replace(_shown("a.csv", 0, 50), stamps=np.arange(50))
+    [note] = repeated([table, replace(table, name="b.csv")])
+    assert note.startswith("a.csv and b.csv share 50 rows")
 
 
 def test_actions_are_compared_by_their_names() -> None:
