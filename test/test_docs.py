@@ -279,3 +279,24 @@ def test_no_page_has_what_a_conflict_leaves() -> None:
     pages = [*_DOCS.glob("*.md"), *checkout.glob("*.md"), checkout / "CHANGELOG.rst"]
     marks = re.compile(r"^(<{7}|={7}$|>{7})", re.MULTILINE)
     assert [page.name for page in pages if marks.search(page.read_text(encoding="utf-8"))] == []
+
+
+#: British spellings; behaviours are what py_trees calls them.
+_BRITISH = re.compile(
+    r"\b(?:colour|neighbour|honour|favour|metres?\b|centred?\b|grey\b|licence|catalogue|judgement"
+    r"|(?:organ|recogn|minim|optim|normal|summar|initial|synchron|general|random|visual|special)is"
+    r"(?:e[ds]?|ing|ation)\b)\w*",
+    re.IGNORECASE,
+)
+
+
+def test_all_pages_are_spelled_as_in_the_united_states() -> None:
+    root = _DOCS.parent
+    pages = [*_DOCS.rglob("*.md"), *root.glob("*.md"), root / "CHANGELOG.rst"]
+    settings = (root / "config").glob("*.yaml")
+    found = {
+        (page.name, word)
+        for page in (*pages, *settings)
+        for word in _BRITISH.findall(page.read_text(encoding="utf-8"))
+    }
+    assert not found

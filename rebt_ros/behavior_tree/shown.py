@@ -14,7 +14,7 @@ from typing import Annotated, TypeAlias
 from rebt_ros.codec.bounds import Bounds, Count
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 
-#: Leaves of a channel in a document; neighbouring ones share their ranges where there are more.
+#: Leaves of a channel in a document; neighboring ones share their ranges where there are more.
 MOST_SHOWN_LEAVES = 250
 
 
@@ -33,7 +33,7 @@ ShownValues: TypeAlias = Span | tuple[str, ...] | None
 
 @dataclass(frozen=True, slots=True)
 class ShownLeaf:
-    """The rows of one leaf, or of neighbouring ones."""
+    """The rows of one leaf, or of neighboring ones."""
 
     rows: Count
     values: tuple[ShownValues, ...]

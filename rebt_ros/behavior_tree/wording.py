@@ -46,7 +46,7 @@ _QUOTES = frozenset("'\"`\u2018\u2019\u201c\u201d")
 
 
 class Kind(Enum):
-    """What a reader of a picture tells apart by colour; the value is the legend's text."""
+    """What a reader of a picture tells apart by color; the value is the legend's text."""
 
     CONTROL = "control node"
     CONDITION = "condition"
@@ -172,7 +172,7 @@ class Wording:
                 return "Repeater: runs its children in order, again and again until one fails"
 
     def kind(self, node: nodes.Node) -> Kind:
-        """The kind by which the node is coloured."""
+        """The kind by which the node is colored."""
         match node:
             case nodes.Condition():
                 return Kind.CONDITION

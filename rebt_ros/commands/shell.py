@@ -1,4 +1,4 @@
-"""What all commands share: options of inputs, colour, errors as one sentence."""
+"""What all commands share: options of inputs, color, errors as one sentence."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def word_of(kind: type[_Word], *others: str) -> Callable[[str], _Word]:
 
 
 def use_color() -> bool:
-    """Whether the terminal shows colours and its user wants them (https://no-color.org)."""
+    """Whether the terminal shows colors and its user wants them (https://no-color.org)."""
     return sys.stdout.isatty() and "NO_COLOR" not in os.environ
 
 

@@ -32,7 +32,7 @@ Hashes = NDArray[np.uint64]
 
 
 def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
-    """Notes on pairs of demonstrations that hold the same rows at the same times.
+    """Notes on rows that are there twice: in two demonstrations, or in a single one.
 
     Args:
         demonstrations: All that are learned from; those without times must have all rows in
@@ -41,19 +41,26 @@ def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
     tell_time = [len(one.stamps) and one.stamps.min() >= _FIRST_TIME for one in demonstrations]
     part = sum(len(one.stamps) for one in demonstrations) // _MOST + 1
     hashes = [_hashes(one, part) for one in demonstrations]
+    for one, found in zip(demonstrations, hashes, strict=True):
+        again = len(one.stamps) - len(found)
+        if part == 1 and again >= max(_FEWEST, _SAME * len(found)):
+            yield (
+                f"{one.name} holds {again} rows again, which count twice: see whether one of its "
+                "files was copied or converted beside itself"
+            )
     owner = np.repeat(np.arange(len(hashes)), [len(one) for one in hashes])
     shared = _shared(np.concatenate([*hashes, np.zeros(0, np.uint64)]), owner)
-    found = [
+    pairs = [
         (first, second, rows)
         for (first, second), rows in sorted(shared.items())
         if rows >= max(_FEWEST, _SAME * min(len(hashes[first]), len(hashes[second])))
         if tell_time[first] or rows == len(hashes[first]) == len(hashes[second]) >= _FEWEST_IN_ALL
     ]
-    for first, second, rows in found[:_NAMED]:
+    for first, second, rows in pairs[:_NAMED]:
         names = f"{demonstrations[first].name} and {demonstrations[second].name}"
         count = rows if part == 1 else f"about {rows * part}"
         yield f"{names} share {count} rows, which count twice: leave one of them out"
-    if (more := len(found) - _NAMED) > 0:
+    if (more := len(pairs) - _NAMED) > 0:
         yield f"{more} more pairs of demonstrations share rows"
 
 

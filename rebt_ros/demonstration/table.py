@@ -121,7 +121,7 @@ class DemonstrationTable:
         """Which rows to test on rather than to learn from, shape (rows,).
 
         The last rows where there is one demonstration; whole demonstrations, the last ones, where
-        there are several, so that no row is tested whose neighbours were learned from.
+        there are several, so that no row is tested whose neighbors were learned from.
 
         Args:
             fraction: Share of the rows to hold out, in [0, 1), as nearly as whole demonstrations

@@ -1,4 +1,4 @@
-"""Pages that need nothing else, in the colours of the reader's screen; all texts are escaped."""
+"""Pages that need nothing else, in the colors of the reader's screen; all texts are escaped."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Where the boxes of a drawn tree go; no two overlap, and both layouts take linear time.
 
 top_down
-    Every level is a line of boxes, and each parent is centred over its children.  Good for trees
+    Every level is a line of boxes, and each parent is centered over its children.  Good for trees
     that are not wider than a page.
 outline
     Reads like an indented text: leaves follow their parent on its line, other children begin lines
@@ -48,7 +48,7 @@ def top_down(
     """The tidy drawing of Reingold and Tilford (1981), for boxes of any width.
 
     Pushing subtrees to the left leaves small ones lopsided between large ones; the mean of that
-    drawing and its mirror image is symmetric, and keeps the gaps and the centring because both
+    drawing and its mirror image is symmetric, and keeps the gaps and the centering because both
     drawings have them.
 
     Raises:
@@ -56,23 +56,23 @@ def top_down(
     """
     children = _children(boxes)
     gaps = (sibling_gap, cousin_gap)
-    leftmost = _centres(boxes, children, gaps)
-    rightmost = _centres(boxes, [child[::-1] for child in children], gaps)
-    centres = [(left - right) / 2 for left, right in zip(leftmost, rightmost, strict=True)]
+    leftmost = _centers(boxes, children, gaps)
+    rightmost = _centers(boxes, [child[::-1] for child in children], gaps)
+    centers = [(left - right) / 2 for left, right in zip(leftmost, rightmost, strict=True)]
     levels = [0] * len(boxes)
     for index, box in enumerate(boxes):
         if box.parent is not None:
             levels[index] = levels[box.parent] + 1
     tops = _tops(boxes, levels, level_gap)
-    start = min(x - box.width / 2 for x, box in zip(centres, boxes, strict=True))
+    start = min(x - box.width / 2 for x, box in zip(centers, boxes, strict=True))
     corners = [
         (x - start - box.width / 2, tops[level])
-        for x, box, level in zip(centres, boxes, levels, strict=True)
+        for x, box, level in zip(centers, boxes, levels, strict=True)
     ]
     links = []
     for index, box in enumerate(boxes):
         if box.parent is not None:
-            from_x, to_x = centres[box.parent] - start, centres[index] - start
+            from_x, to_x = centers[box.parent] - start, centers[index] - start
             to_y = corners[index][1]
             from_y, turn = corners[box.parent][1] + boxes[box.parent].height, to_y - level_gap / 2
             links.append(((from_x, from_y), (from_x, turn), (to_x, turn), (to_x, to_y)))
@@ -202,7 +202,7 @@ class _Contour:
         return behind
 
 
-def _centres(
+def _centers(
     boxes: Sequence[Box], children: Sequence[Sequence[int]], gaps: tuple[float, float]
 ) -> list[float]:
     """Where each box's middle is when every subtree is as far to the left as it goes.

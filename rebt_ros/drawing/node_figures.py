@@ -1,4 +1,4 @@
-"""Drawn trees: coloured boxes with words in them, laid out and linked, and a legend of colours.
+"""Drawn trees: colored boxes with words in them, laid out and linked, and a legend of colors.
 
 Every text has a contrast of at least 4.5 (WCAG 2 AA) to its box.
 """
@@ -29,7 +29,7 @@ from rebt_ros.drawing.shapes import (
 
 @dataclass(frozen=True, slots=True)
 class Colors:
-    """Colours of a kind of node, as #rrggbb."""
+    """Colors of a kind of node, as #rrggbb."""
 
     fill: str
     line: str
@@ -117,7 +117,7 @@ def drawn(figures: Sequence[Figure]) -> Drawing:
 
 
 def legend(kinds: Iterable[Kind], width: float = PAGE_WIDTH) -> Drawing:
-    """The colours of the kinds that occur."""
+    """The colors of the kinds that occur."""
     occurring = frozenset(kinds)
     return shelves([_chip(kind) for kind in Kind if kind in occurring], width, gap=16.0)
 

@@ -7,7 +7,7 @@ drawing
 page
     A drawing with margins around it, on white, and a title.
 
-Lengths are in pixels, y grows downwards, colours are written #rrggbb.
+Lengths are in pixels, y grows downwards, colors are written #rrggbb.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Text:
     """A line of text."""
 
     x: float
-    """Its left end, or its middle if it is centred."""
+    """Its left end, or its middle if it is centered."""
     y: float
     """Its baseline."""
     text: str

@@ -28,7 +28,7 @@ def render_text(learned: LearnedTree, *, color: bool = False) -> str:
 
     Args:
         learned: The tree to show.
-        color: Whether to colour the nodes by kind with ANSI escape sequences.
+        color: Whether to color the nodes by kind with ANSI escape sequences.
 
     Returns:
         One line per node, each with a line break; an Inverter shares the line of its condition.

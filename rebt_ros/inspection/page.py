@@ -9,7 +9,7 @@ from rebt_ros.drawing.html import page, paragraph, table, text
 from rebt_ros.inspection.inspection import Inspected, Inspection
 from rebt_ros.inspection.wording import HEADING, action_name, cells, findings_of, summary
 
-#: Actions with a colour of their own, the most frequent ones.
+#: Actions with a color of their own, the most frequent ones.
 _COLORED: Final = 6
 _STYLE: Final = """
 :root { --action-1: #1f6fb4; --action-2: #e08a2c; --action-3: #2f9e6e; --action-4: #b04a8f;

@@ -152,7 +152,7 @@ class CrossValidation:
 def folds(table: DemonstrationTable) -> IntArray:
     """The fold of each row: whole demonstrations, or stretches of the only one, shape (rows,).
 
-    Neighbouring rows resemble each other, so that a row whose neighbours were learned from would
+    Neighboring rows resemble each other, so that a row whose neighbors were learned from would
     tell little.
     """
     most = MOST_FOLDS if len(table) < _MANY_ROWS else _FEW_FOLDS

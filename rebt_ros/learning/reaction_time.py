@@ -127,7 +127,7 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
     third, without a delay, such a delay is only taken if it does as much.  And who starts something
     at one border and goes on until another one looks as if late at a border between them: where
     previous actions explain that with two leaves for each action, states alone have to do clearly
-    better than that.  Of neighbours that are equally small it is the one in the middle; if they
+    better than that.  Of neighbors that are equally small it is the one in the middle; if they
     reach to the longest delay, as where each state follows from the one before, the first of them.
 
     A delay is clear if its explanation is not larger than a third of the rows, and smaller than the
@@ -321,7 +321,7 @@ def _clear(trials: Sequence[Trial], explained: int) -> int:
 
 
 def _peak(trials: Sequence[Trial]) -> Trial:
-    """The delay with the smallest explanation; of equal neighbours, see `estimate`."""
+    """The delay with the smallest explanation; of equal neighbors, see `estimate`."""
     sizes = [trial.size for trial in trials]
     first = last = sizes.index(min(sizes))
     while last + 1 < len(sizes) and sizes[last + 1] == sizes[first]:

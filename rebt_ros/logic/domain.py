@@ -103,8 +103,8 @@ def infeasible(conditions: Iterable[Condition]) -> Dnf:
             case IsTrue() | Interval():
                 # Nothing is said of intervals, which are made of rules that are minimized already.
                 pass
-    # Neighbours are enough: below the first but not below the third threshold means not to lie
-    # between one of the two pairs of neighbours.
+    # Neighbors are enough: below the first but not below the third threshold means not to lie
+    # between one of the two pairs of neighbors.
     lower_without_higher = (
         Conjunction((Literal(lower), ~Literal(higher)))
         for group in thresholds.values()

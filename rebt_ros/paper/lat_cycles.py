@@ -237,7 +237,7 @@ class _Work:
 
 
 class _Steps:
-    """The demonstrations as nodes that follow each other, neighbours differ.
+    """The demonstrations as nodes that follow each other, neighbors differ.
 
     Inside a cycle node nothing new begins.  Which nodes a run can be of is a number, so that loops
     are cut out of arrays, and counted as bytes.

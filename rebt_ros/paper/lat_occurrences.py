@@ -28,7 +28,7 @@ from rebt_ros.paper.lat_nodes import ActionNode, GraphNode
 
 _Found = TypeVar("_Found")
 
-#: Labels of the actions of each demonstration; neighbours differ, or are rows.
+#: Labels of the actions of each demonstration; neighbors differ, or are rows.
 Runs: TypeAlias = tuple[tuple[str, ...], ...]
 #: Bit n stands for the place before run n, of all demonstrations one after the other.
 _Places: TypeAlias = int

@@ -66,11 +66,11 @@ class State(NamedTuple):
     """What the robot measures."""
 
     left: float
-    """Free metres between 30 and 90 degrees to the left, up to 4."""
+    """Free meters between 30 and 90 degrees to the left, up to 4."""
     front: float
-    """Free metres within 30 degrees of its heading, up to 4."""
+    """Free meters within 30 degrees of its heading, up to 4."""
     right: float
-    """Free metres between 30 and 90 degrees to the right, up to 4."""
+    """Free meters between 30 and 90 degrees to the right, up to 4."""
     target_bearing: float
     """Radians from its heading to where it has to go, -pi..pi, positive to the left.
 

@@ -15,7 +15,7 @@ BEAMS: Final = 121
 FIRST_ANGLE: Final = -math.pi / 2
 ANGLE_STEP: Final = math.pi / (BEAMS - 1)
 
-#: Metres from the middle of the robot.
+#: Meters from the middle of the robot.
 SHORTEST_RANGE: Final = 0.05
 LONGEST_RANGE: Final = 4.2
 
@@ -34,7 +34,7 @@ def ranges(world: World, place: Point, heading: float) -> FloatArray:
         heading: Where it looks, radians.
 
     Returns:
-        Metres, (`BEAMS`,): infinite where nothing is within `LONGEST_RANGE`, NaN where a beam
+        Meters, (`BEAMS`,): infinite where nothing is within `LONGEST_RANGE`, NaN where a beam
         hardly grazes what it meets.
     """
     cosine, sine = np.cos(heading + _ANGLES), np.sin(heading + _ANGLES)

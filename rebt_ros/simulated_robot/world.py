@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A place in the room, metres from its lower left corner."""
+    """A place in the room, meters from its lower left corner."""
 
     x: float
     y: float
 
     def distance(self, other: Point) -> float:
-        """Metres between two places."""
+        """Meters between two places."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
     def direction(self, other: Point) -> float:
@@ -28,7 +28,7 @@ class Obstacle:
 
     center: Point
     radius: float
-    """Metres."""
+    """Meters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class World:
     """
 
     size: float
-    """Length of a wall, metres."""
+    """Length of a wall, meters."""
     obstacles: tuple[Obstacle, ...]
     goal: Point
     dock: Point
@@ -51,7 +51,7 @@ class World:
                 raise ValueError(f"the {name} at {place} is inside an obstacle or a wall")
 
     def clearance(self, place: Point) -> float:
-        """Metres to the nearest wall or obstacle; negative inside of one."""
+        """Meters to the nearest wall or obstacle; negative inside of one."""
         walls = min(place.x, place.y, self.size - place.x, self.size - place.y)
         return min(
             walls,
@@ -60,7 +60,7 @@ class World:
         )
 
     def nearest(self, place: Point, first: float, last: float) -> float:
-        """Metres to the nearest thing that a sensor sees in its cone.
+        """Meters to the nearest thing that a sensor sees in its cone.
 
         It is exact: a wall or an obstacle is nearest straight ahead of it, or at the border of the
         cone.  A fan of rays instead would let the distance jump while the robot turns.
@@ -75,7 +75,7 @@ class World:
         return min(self._ray(place, heading) for heading in (first, last, *inside))
 
     def _ray(self, place: Point, heading: float) -> float:
-        """Metres to what a ray hits first."""
+        """Meters to what a ray hits first."""
         cosine, sine = math.cos(heading), math.sin(heading)
         hit = min(_until_wall(place.x, cosine, self.size), _until_wall(place.y, sine, self.size))
         for obstacle in self.obstacles:

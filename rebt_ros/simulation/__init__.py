@@ -1,7 +1,7 @@
 """The simulated robot, by the name that programs outside the package know it by.
 
 `../shared/closed_loop`, which judges learned trees by driving, imports `rebt_ros.simulation.robot`
-and its neighbours.
+and its neighbors.
 """
 
 from __future__ import annotations

@@ -188,7 +188,7 @@ def _files(
     if missing and not files:
         raise InputError(
             f"{directory} lacks the files that its {bag_metadata.NAME} lists "
-            f"({', '.join(missing)}): put them back."
+            f"({', '.join(missing)}): put them back{_unfinished(directory, missing)}."
         )
     for name in missing:
         notes.append(f"{name} is listed in {bag_metadata.NAME} and not there: it was not read")
@@ -196,6 +196,13 @@ def _files(
         if without_packing(file.name) not in known:
             notes.append(f"{file.name} is not listed in {bag_metadata.NAME}: it is read as well")
     return sorted(files, key=lambda file: (listed.get(file.name, len(listed)), file.name))
+
+
+def _unfinished(directory: Path, missing: Sequence[str]) -> str:
+    """What is there of missing files under longer names, as while they are copied or written."""
+    there = sorted(one.name for one in directory.iterdir())
+    found = [one for one in there if any(one.startswith(f"{name}.") for name in missing)]
+    return f", or wait for what writes {', '.join(found)}" if found else ""
 
 
 def _open_all(files: Sequence[Path], bag: BagFiles, stack: ExitStack) -> None:

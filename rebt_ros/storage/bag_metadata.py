@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from textwrap import shorten
-from typing import Any, Final
+from typing import Final
 
 from rebt_ros.errors import InputError
 
@@ -68,7 +68,12 @@ def read_metadata(directory: Path) -> BagMetadata | None:
 
 def _parsed(text: str) -> BagMetadata:
     safe = importlib.import_module("ruamel.yaml").YAML(typ="safe")
-    about: dict[str, Any] = safe.load(text)["rosbag2_bagfile_information"]
+    if "\0" in text:
+        raise ValueError("it holds zero bytes, as where a machine lost power")
+    loaded = safe.load(text)
+    about = loaded.get("rosbag2_bagfile_information") if isinstance(loaded, dict) else None
+    if not isinstance(about, dict):
+        raise ValueError("it says nothing of a bag" if loaded else "it is empty")
     if int(about.get("version", _NEWEST)) > _NEWEST:
         raise ValueError(f"version {about['version']} is newer than {_NEWEST}")
     counts: dict[tuple[str, str], int] = {}

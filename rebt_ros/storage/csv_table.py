@@ -76,7 +76,7 @@ def read_csv(
         labels: Columns that hold the actions; without a header their names (`x24`) or indices
             (`24`); by default the column that is called `action`, else the last column.
         header: Whether the first line names the columns (`x0`, `x1`, ... if not).  A first line
-            that holds data all the same is recognised by its values and noted.
+            that holds data all the same is recognized by its values and noted.
         row_kind: What a row is; None: an event where a column says how actions ended, else a
             sample.
         features: Columns that are features even where their names say that they number or date the

@@ -1,4 +1,4 @@
-"""Bar charts as SVG to stand in a page, which gives them their colours.
+"""Bar charts as SVG to stand in a page, which gives them their colors.
 
 The page defines the CSS variables ``--ink``, ``--faded``, ``--grid`` and ``--series-1``,
 ``--series-2``, so that a chart can be read on a light and on a dark ground.
@@ -21,7 +21,7 @@ _MOST_TICKS, _MOST_LABELS = 6, 14
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Bars of one colour."""
+    """Bars of one color."""
 
     name: str
     counts: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""The report as one page that needs nothing else, in the colours of the reader's screen."""
+"""The report as one page that needs nothing else, in the colors of the reader's screen."""
 
 from __future__ import annotations
 

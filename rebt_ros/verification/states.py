@@ -50,7 +50,7 @@ class Near:
 
 @dataclass(frozen=True, slots=True)
 class _Range:
-    """Values ``above < x <= at_most`` of neighbouring cells; of missing ones, both are NaN."""
+    """Values ``above < x <= at_most`` of neighboring cells; of missing ones, both are NaN."""
 
     above: float
     at_most: float
@@ -413,7 +413,7 @@ def _only(value: float) -> _Range:
 
 
 def _ranges(field: Field, cells: BoolArray) -> list[_Range]:
-    """The values of some cells, neighbouring ones together; the missing value comes last."""
+    """The values of some cells, neighboring ones together; the missing value comes last."""
     numbers = np.concatenate([[False], cells[:-1], [False]])
     borders = np.flatnonzero(numbers[1:] != numbers[:-1])
     ranges = [

@@ -86,3 +86,17 @@ def test_a_part_of_many_rows_tells(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_without_demonstrations_there_is_nothing_to_say() -> None:
     assert list(repeated([])) == []
+
+
+def test_rows_that_a_demonstration_holds_twice_are_noticed() -> None:
+    once = _shown("bag", 0, 50)
+    twice = replace(
+        once,
+        states=np.repeat(once.states, 2, axis=0),
+        stamps=np.repeat(once.stamps, 2),
+        chosen=np.repeat(once.chosen, 2),
+        channel=np.repeat(once.channel, 2),
+    )
+    [note] = repeated([twice])
+    assert note.startswith("bag holds 50 rows again")
+    assert list(repeated([once])) == []

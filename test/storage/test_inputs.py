@@ -332,3 +332,15 @@ def test_a_link_is_followed_and_others_may_read_the_file(tmp_path):
     assert link.is_symlink()
     assert (tmp_path / "target").read_bytes() == "über".encode()
     assert stat.S_IMODE((tmp_path / "target").stat().st_mode) == 0o644
+
+
+def test_a_table_from_a_pipe_is_read(tmp_path):
+    content = write_table(tmp_path / "table.csv").read_bytes()
+    reading, writing = os.pipe()
+    try:
+        os.write(writing, content)
+        os.close(writing)
+        (read,) = load([Path(f"/dev/fd/{reading}")]).demonstrations
+    finally:
+        os.close(reading)
+    assert read.actions == ("go", "turn")

@@ -264,3 +264,36 @@ def test_a_file_that_may_not_be_read_is_called_so(tmp_path: Path) -> None:
     path.chmod(0)
     with pytest.raises(InputError, match="check its permissions"):
         read_bag(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (b"", "it is empty"),
+        (b"# nothing\n", "it is empty"),
+        (b"- 1\n", "it says nothing of a bag"),
+        (b"rosbag2_bagfile_information:\n", "it says nothing of a bag"),
+        (bytes(900), "it holds zero bytes, as where a machine lost power"),
+    ],
+)
+def test_metadata_that_a_loss_of_power_left_is_called_what_it_is(
+    tmp_path: Path, content: bytes, why: str
+) -> None:
+    bag = table.READERS["mcap"](tmp_path / "bag")
+    rows = len(read_bag(bag).demonstration)
+    (bag / "metadata.yaml").write_bytes(content)
+    read = read_bag(bag)
+    assert len(read.demonstration) == rows
+    [note] = read.notes
+    assert f"metadata.yaml cannot be read ({why}" in note
+
+
+@pytest.mark.parametrize("ending", [".part", ".crdownload", ".active"])
+def test_a_file_that_is_still_written_is_named_where_it_is_missing(
+    tmp_path: Path, ending: str
+) -> None:
+    bag = table.READERS["mcap"](tmp_path / "bag")
+    (file,) = bag.glob("*.mcap")
+    file.rename(bag / f"{file.name}{ending}")
+    with pytest.raises(InputError, match=f"or wait for what writes {file.name}{ending}"):
+        read_bag(bag)

@@ -136,7 +136,7 @@ def _turned(angle: float) -> Quaternion:
 
 
 def _free(scan: LaserScan, first: float, last: float) -> float:
-    """Free metres before the robot's hull between two directions (degrees)."""
+    """Free meters before the robot's hull between two directions (degrees)."""
     begin, end = (
         round((math.radians(angle) - scan.angle_min) / scan.angle_increment)
         for angle in (first, last)

@@ -1,12 +1,12 @@
-// One colour for each action, the same everywhere. After Okabe and Ito: colour-blind people tell them
-// apart; the action's name stands beside the colour wherever there is room.
+// One color for each action, the same everywhere. After Okabe and Ito: color-blind people tell them
+// apart; the action's name stands beside the color wherever there is room.
 
 const FILLS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#8c8c8c"];
 const INKS = ["#ffffff", "#000000", "#000000", "#000000", "#000000", "#000000", "#000000", "#000000"];
 
 const places = new Map();
 
-/** Gives known labels their colours, in the order of the alphabet. */
+/** Gives known labels their colors, in the order of the alphabet. */
 export function knowLabels(labels) {
   for (const label of [...labels].sort()) {
     if (!places.has(label)) places.set(label, places.size);
@@ -23,7 +23,7 @@ export function fillOf(label) {
   return FILLS[place(label)];
 }
 
-/** The colour of words on that fill. */
+/** The color of words on that fill. */
 export function inkOf(label) {
   return INKS[place(label)];
 }

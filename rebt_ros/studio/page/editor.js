@@ -70,8 +70,8 @@ export class Editor {
     const move = (by) => this.ask("move", { path: node.path, by }, { undo });
     const isRoot = node.parent === null;
     const within = this.view.nodes.filter((other) => other.path.startsWith(`${node.path}.`)).length;
-    const earlier = button("◀ Earlier", () => move(-1), { title: "Is tried before its neighbour on the left" });
-    const later = button("Later ▶", () => move(1), { title: "Is tried after its neighbour on the right" });
+    const earlier = button("◀ Earlier", () => move(-1), { title: "Is tried before its neighbor on the left" });
+    const later = button("Later ▶", () => move(1), { title: "Is tried after its neighbor on the right" });
     const remove = button(within ? `Delete this branch of ${within + 1} nodes` : "Delete this node", () => this.ask("remove", { path: node.path }, { undo }), { class: "careful" });
     earlier.disabled = isRoot || place === 0;
     later.disabled = isRoot || place === siblings.length - 1;

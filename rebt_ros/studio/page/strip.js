@@ -254,7 +254,7 @@ export class Strip {
   }
 }
 
-/** What a person did is hatched: it differs from what the tree did without colour, too. */
+/** What a person did is hatched: it differs from what the tree did without color, too. */
 function hatch(pen, left, top, width) {
   pen.save();
   pen.beginPath();

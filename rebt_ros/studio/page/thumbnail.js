@@ -66,7 +66,7 @@ export function thumbnail(shown, name, { large = false } = {}) {
   return element("div", { class: "large-picture" }, picture, legend);
 }
 
-/** An action with its colour. */
+/** An action with its color. */
 export function chip(label, words, tag = "li") {
   const made = element(tag, { class: "chip" }, words);
   made.style.background = fillOf(label);

@@ -21,7 +21,7 @@ const KINDS = {
   repeater: "repeater",
 };
 
-/** The status as a shape, 18 pixels wide, centred at the origin. */
+/** The status as a shape, 18 pixels wide, centered at the origin. */
 const SIGNS = {
   SUCCESS: "M-4.5 0.5L-1.5 3.5L4.5 -3.5",
   FAILURE: "M-3.5 -3.5L3.5 3.5M3.5 -3.5L-3.5 3.5",
@@ -82,7 +82,7 @@ export class Tree {
   // --- what happens ---
 
   /**
-   * Colours the nodes.
+   * Colors the nodes.
    *
    * @param {string[] | null} statuses - Of each node; null where they are not known.
    * @param {object} values - The state by feature.
@@ -297,8 +297,8 @@ export class Tree {
   /** The box; an Inverter and its condition are two halves of one. */
   outline(node) {
     const radius = node.pill ? node.height / 2 : 6;
-    const left = this.neighbour(node, -1) ? 0 : radius;
-    const right = this.neighbour(node, 1) ? 0 : radius;
+    const left = this.neighbor(node, -1) ? 0 : radius;
+    const right = this.neighbor(node, 1) ? 0 : radius;
     const arc = (size, x, y) => (size ? `a${size} ${size} 0 0 1 ${x * size} ${y * size}` : "");
     return (
       `M${left} 0h${node.width - left - right}${arc(right, 1, 1)}v${node.height - 2 * right}` +
@@ -307,7 +307,7 @@ export class Tree {
     );
   }
 
-  neighbour(node, side) {
+  neighbor(node, side) {
     if (!node.pill) return false;
     const { nodes } = this.view;
     const other = nodes[nodes.indexOf(node) + side];
