@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import prompt_answers
 import pytest
+import warm_processes
 from hypothesis import HealthCheck, Phase, settings
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 # Whichever test uses the middleware first.
 prompt_answers.use()
+warm_processes.use()
 
 # A script's background jobs ignore SIGINT, and so would every process that a test starts.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -30,6 +30,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 from std_srvs.srv import SetBool, Trigger
+from warm_processes import HOME, WarmProcess, can_start
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
@@ -105,7 +106,7 @@ class NodeProcess:
         directory: Its working directory; its logs and standard error go there.
         parameters: Values of its parameters.
         arguments: Further ROS arguments, such as remappings.
-        command: What starts it; see `command_of`.
+        command: What starts it; see `command_of`.  None for a process that starts in no time.
     """
 
     def __init__(
@@ -117,21 +118,35 @@ class NodeProcess:
         arguments: Sequence[str] = (),
         command: Sequence[str] | None = None,
     ) -> None:
-        command = [*(command or command_of(module.removesuffix("_node"))), "--ros-args"]
+        node = module.removesuffix("_node")
+        words = ["--ros-args"]
         for name, value in (parameters or {}).items():
-            command += ["-p", f"{name}:={_yaml(value)}"]
+            words += ["-p", f"{name}:={_yaml(value)}"]
+        words += arguments
         environment = dict(
             os.environ,
             ROS_DOMAIN_ID=str(domain),
             ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
             ROS_LOG_DIR=str(directory / "log"),
-            PYTHONPATH=os.pathsep.join([str(CHECKOUT), os.environ.get("PYTHONPATH", "")]),
+            PYTHONPATH=os.pathsep.join([str(HOME), os.environ.get("PYTHONPATH", "")]),
         )
         environment.pop(prompt_answers.VARIABLE, None)
         self._errors = directory / f"{module}.{time.monotonic_ns()}.stderr"
-        with self._errors.open("wb") as errors:
+        self.process: subprocess.Popen[bytes] | WarmProcess
+        with self._errors.open("wb") as errors, open(os.devnull) as nothing:
+            if command is None and can_start(environment):
+                self.process = WarmProcess(
+                    "rebt_ros.ros.entry",
+                    [node, *words],
+                    environment=environment,
+                    directory=directory,
+                    files=(nothing.fileno(), errors.fileno(), errors.fileno()),
+                    session=True,
+                    blocked=(signal.SIGINT, signal.SIGTERM),
+                )
+                return
             self.process = subprocess.Popen(
-                [*command, *arguments],
+                [*(command or command_of(node)), *words],
                 cwd=directory,
                 env=environment,
                 stdout=errors,

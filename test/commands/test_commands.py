@@ -4,22 +4,13 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+import warm_processes
 
 from rebt_ros.storage.btlog import read_btlog
 from rebt_ros.storage.tree_file import read_tree
-
-#: Runs a module as a program where nothing of ROS can be imported.
-WITHOUT_ROS = """
-import runpy, sys
-for name in ("rclpy", "std_msgs", "std_srvs", "diagnostic_msgs", "ament_index_python"):
-    sys.modules[name] = None
-module, *sys.argv[1:] = sys.argv[1:]
-runpy.run_module(module, run_name="__main__", alter_sys=True)
-"""
 
 TABLE = "front,docked,action\n" + "".join(
     f"{front / 10},{docked},{'charge' if docked else 'turn' if front < 5 else 'go'}\n"
@@ -30,15 +21,8 @@ TABLE = "front,docked,action\n" + "".join(
 
 
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = ["learn", "replay"].index(str(arguments[0]))
-    module = f"rebt_ros.commands.{('learn', 'replay')[command]}"
-    return subprocess.run(
-        [sys.executable, "-c", WITHOUT_ROS, module, *map(str, arguments[1:])],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    """Runs a command where nothing of ROS can be imported."""
+    return warm_processes.run(f"rebt_ros.commands.{arguments[0]}", *arguments[1:], ros=False)
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 import robot_bags as some
+import warm_processes
 from ros_processes import CHECKOUT, Peer
 from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import String
@@ -26,18 +27,8 @@ from rebt_ros.storage.input_options import InputOptions
 
 
 def _describe(*arguments: object, domain: int | None = None) -> subprocess.CompletedProcess[str]:
-    environment = dict(os.environ, ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
-    environment["PYTHONPATH"] = os.pathsep.join([str(CHECKOUT), os.environ.get("PYTHONPATH", "")])
-    if domain is not None:
-        environment["ROS_DOMAIN_ID"] = str(domain)
-    return subprocess.run(
-        [sys.executable, "-m", "rebt_ros.commands.describe", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-        env=environment,
-    )
+    variables = {} if domain is None else {"ROS_DOMAIN_ID": str(domain)}
+    return warm_processes.run("rebt_ros.commands.describe", *arguments, **variables)
 
 
 def _survey(topic: str, messages: Sequence[Any]) -> TopicSurvey:

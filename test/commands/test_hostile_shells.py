@@ -6,9 +6,11 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+import warm_processes
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 ROWS = "".join(
@@ -58,7 +60,10 @@ def learned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 def _run(
     command: str, *arguments: object, shell: str = "", **variables: str | None
 ) -> subprocess.CompletedProcess[str]:
-    return _python("-m", f"rebt_ros.commands.{command}", *arguments, shell=shell, **variables)
+    module = f"rebt_ros.commands.{command}"
+    if not shell and not variables:
+        return warm_processes.run(module, *arguments)
+    return _python("-m", module, *arguments, shell=shell, **variables)
 
 
 def _python(
@@ -83,27 +88,45 @@ def _python(
     )
 
 
-#: Runs modules with --help, each in a process of its own that has imported already what they share.
-_HELP = """
+#: Runs modules, each in a process of its own that has imported already what they share.
+_TOGETHER = """
 import importlib, json, os, runpy, sys
-directory, *modules = sys.argv[1:]
-for module in modules:
+directory, calls = sys.argv[1], json.loads(sys.argv[2])
+for module, *_ in calls:
     importlib.import_module(module)
-codes = {}
-for module in modules:
+codes = []
+for place, (module, *arguments) in enumerate(calls):
     child = os.fork()
     if not child:
-        sys.argv = [module, "--help"]
+        sys.argv = [module, *arguments]
         del sys.modules[module]
-        os.dup2(os.open(os.path.join(directory, module), os.O_CREAT | os.O_WRONLY), 1)
-        try:
-            runpy.run_module(module, run_name="__main__")
-        except SystemExit as end:
-            sys.stdout.flush()
-            os._exit(end.code)
-    codes[module] = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        for stream in (1, 2):
+            path = os.path.join(directory, f"{place}.{stream}")
+            os.dup2(os.open(path, os.O_CREAT | os.O_WRONLY), stream)
+        runpy.run_module(module, run_name="__main__")
+        sys.exit()
+    codes.append(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 print(json.dumps(codes))
 """
+
+
+def _together(
+    directory: Path, *calls: Sequence[object], **variables: str | None
+) -> list[subprocess.CompletedProcess[str]]:
+    """Runs commands one after the other, all where the environment is the same."""
+    called = [[f"rebt_ros.commands.{name}", *map(str, arguments)] for name, *arguments in calls]
+    directory.mkdir()
+    done = _python("-c", _TOGETHER, directory, json.dumps(called), **variables)
+    assert (done.returncode, done.stderr) == (0, "")
+
+    def said(place: int, stream: int) -> str:
+        return (directory / f"{place}.{stream}").read_text(errors="replace")
+
+    return [
+        subprocess.CompletedProcess(called[place], code, said(place, 1), said(place, 2))
+        for place, code in enumerate(json.loads(done.stdout))
+    ]
+
 
 ENCODINGS: list[dict[str, str | None]] = [
     {"PYTHONIOENCODING": "ascii"},
@@ -119,11 +142,8 @@ def test_learn_replay_and_show_write_what_the_terminal_can_show(
 ) -> None:
     out = tmp_path / "out"
     tree = out / "tree.json"
-    for done in (
-        _run("learn", table, "--out", out, **environment),
-        _run("replay", tree, table, **environment),
-        _run("show", tree, **environment),
-    ):
+    calls = [("learn", table, "--out", out), ("replay", tree, table), ("show", tree)]
+    for done in _together(tmp_path / "said", *calls, **environment):
         assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
         assert done.stdout
     assert "dreh … ≤" in (out / "tree.txt").read_text(encoding="utf-8")
@@ -133,12 +153,10 @@ def test_learn_replay_and_show_write_what_the_terminal_can_show(
 def test_every_command_has_help_for_every_terminal(
     environment: dict[str, str | None], tmp_path: Path
 ) -> None:
-    commands = [f"rebt_ros.commands.{command}" for command in COMMANDS]
-    done = _python("-c", _HELP, tmp_path, *commands, **environment)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads(done.stdout) == dict.fromkeys(commands, 0)
-    for command in commands:
-        assert "usage" in (tmp_path / command).read_text(errors="replace")
+    calls = [(command, "--help") for command in COMMANDS]
+    for done in _together(tmp_path / "said", *calls, **environment):
+        assert (done.returncode, done.stderr) == (0, ""), done.args
+        assert "usage" in done.stdout
 
 
 @pytest.mark.parametrize("command", ["export", "learn", "replay", "show"])

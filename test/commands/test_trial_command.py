@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -18,10 +16,11 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from ros_processes import CHECKOUT, LATCHED, PATIENCE, NodeProcess, Peer, values_of, wait_until
+from ros_processes import LATCHED, PATIENCE, NodeProcess, Peer, values_of, wait_until
 from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import Trigger
 from trial_examples import ALWAYS_GO, ALWAYS_LEFT, ANOTHER, BAD, GOOD
+from warm_processes import WarmProcess
 
 import rebt_ros
 from rebt_ros.behavior_tree import nodes
@@ -61,17 +60,22 @@ class TrialProcess:
             ROS_DOMAIN_ID=str(domain),
             ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
             ROS_LOG_DIR=str(directory / "log"),
-            PYTHONPATH=os.pathsep.join([str(CHECKOUT), os.environ.get("PYTHONPATH", "")]),
         )
         self._paths = [directory / f"trial.{time.monotonic_ns()}.{one}" for one in ("out", "err")]
-        with self._paths[0].open("wb") as out, self._paths[1].open("wb") as err:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", "rebt_ros.commands.trial", *arguments],
-                cwd=directory,
-                env=environment,
-                stdin=subprocess.PIPE,
-                stdout=out,
-                stderr=err,
+        theirs, ours = os.pipe()
+        self.stdin = os.fdopen(ours, "wb")
+        """What is typed."""
+        with (
+            os.fdopen(theirs) as typed,
+            self._paths[0].open("wb") as out,
+            self._paths[1].open("wb") as err,
+        ):
+            self.process = WarmProcess(
+                "rebt_ros.commands.trial",
+                arguments,
+                environment=environment,
+                directory=directory,
+                files=(typed.fileno(), out.fileno(), err.fileno()),
             )
 
     @property
@@ -88,9 +92,8 @@ class TrialProcess:
 
     def answers(self, line: str) -> None:
         """Types a line."""
-        assert self.process.stdin is not None
-        self.process.stdin.write(f"{line}\n".encode())
-        self.process.stdin.flush()
+        self.stdin.write(f"{line}\n".encode())
+        self.stdin.flush()
 
     def ends(self, peer: Peer, code: int = 0) -> str:
         """Waits for its end, while the test's node goes on; returns what it has printed."""
@@ -112,6 +115,7 @@ def trial(domain: int, directory: Path, *arguments: str | Path) -> Iterator[Tria
         if not one.over:
             one.process.kill()
         one.process.wait()
+        one.stdin.close()
 
 
 class World:
@@ -397,8 +401,7 @@ def test_a_person_who_is_asked_may_end_it_instead(domain: int, peer: Peer, tmp_p
 def test_a_trial_ends_where_nobody_answers(domain: int, peer: Peer, tmp_path: Path) -> None:
     (tree,) = _write(tmp_path, go=ALWAYS_GO)
     with executor(domain, tmp_path, peer), trial(domain, tmp_path, tree, "--ask") as running:
-        assert running.process.stdin is not None
-        running.process.stdin.close()
+        running.stdin.close()
         running.ends(peer, 1)
     assert "standard input was closed" in running.err
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import math
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import robot_bags as some
+import warm_processes
 from rosbags.rosbag2 import StoragePlugin
 from std_msgs.msg import Float64MultiArray, String
 
@@ -182,14 +182,8 @@ def test_the_commands_learn_and_replay_by_a_robot_file(tmp_path: Path) -> None:
     bag = some.write_bag(tmp_path / "bag", some.shown())
     (tmp_path / "robot.yaml").write_text(some.ROBOT_FILE)
 
-    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", f"rebt_ros.commands.{arguments[0]}", *map(str, arguments[1:])],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=300,
-        )
+    def run(command: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+        return warm_processes.run(f"rebt_ros.commands.{command}", *arguments)
 
     robot = ("--robot", tmp_path / "robot.yaml")
     learned = run("learn", bag, *robot, "--out", tmp_path / "learned")

@@ -47,7 +47,7 @@ def domain() -> Iterator[int]:
 
 def _start(node: str, domain: int, directory: Path) -> NodeProcess:
     executable = _installed(node)
-    command = executable and [str(executable)]
+    command = [str(executable)] if executable else command_of(node)
     parameters = {}
     if node == "synthetic_robot":
         parameters["config"] = directory / "tree.json"

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shlex
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +14,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 import robot_bags as some
+import warm_processes
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_processes import CHECKOUT, PATIENCE, NodeProcess, Peer
 from sensor_msgs.msg import Joy
@@ -60,14 +58,7 @@ def _node(name: str, domain: int, directory: Path) -> NodeProcess:
 
 
 def _run(name: str, directory: Path) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", f"rebt_ros.commands.{name}", *_arguments(name)],
-        cwd=directory,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = warm_processes.run(f"rebt_ros.commands.{name}", *_arguments(name), directory=directory)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from ros_processes import CHECKOUT, NodeProcess
+from ros_processes import CHECKOUT, NodeProcess, command_of
 
 from soak.ledger import Ledger
 
@@ -53,7 +53,12 @@ class Fleet:
     def start(self, name: str) -> None:
         """Starts a node."""
         process = NodeProcess(
-            f"{name}_node", self.domain, self.directory, self.parameters.get(name, {})
+            f"{name}_node",
+            self.domain,
+            self.directory,
+            self.parameters.get(name, {}),
+            # Its environment, by which `_left` knows it, is what it was started with.
+            command=command_of(name),
         )
         self._lives[name] = _Life(process, time.monotonic())
 

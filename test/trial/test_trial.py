@@ -8,7 +8,6 @@ import math
 import random
 import re
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -16,6 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+import warm_processes
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from trial_examples import BAD, GO, GOOD, LEFT, learned
@@ -567,24 +567,9 @@ def test_a_start_parameter_is_a_node_and_a_name() -> None:
         StartParameter.of("robot/first_start", -1)
 
 
-#: Runs the command where nothing of ROS can be imported.
-WITHOUT_ROS = """
-import runpy, sys
-for name in ("rclpy", "std_msgs", "std_srvs", "diagnostic_msgs", "rcl_interfaces"):
-    sys.modules[name] = None
-sys.argv[0] = "trial"
-runpy.run_module("rebt_ros.commands.trial", run_name="__main__", alter_sys=True)
-"""
-
-
 def _run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", WITHOUT_ROS, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    """Runs the command where nothing of ROS can be imported."""
+    return warm_processes.run("rebt_ros.commands.trial", *arguments, ros=False)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,57 @@
+"""Processes that are forked from one that has imported everything behave as others do."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+from warm_processes import WarmProcess, can_start, run
+
+
+def test_what_it_writes_and_its_exit_code_are_those_of_the_module(tmp_path: Path) -> None:
+    (tmp_path / "good.json").write_text('{"a": 1}')
+    (tmp_path / "bad.json").write_text('{"a": ')
+    good = run("json.tool", "good.json", directory=tmp_path)
+    assert (good.returncode, json.loads(good.stdout), good.stderr) == (0, {"a": 1}, "")
+    bad = run("json.tool", "bad.json", directory=tmp_path)
+    assert (bad.returncode, bad.stdout) == (1, "")
+    assert "Expecting value" in bad.stderr
+
+
+def test_a_signal_ends_it_and_it_ends_by_itself() -> None:
+    for number in (None, signal.SIGTERM, signal.SIGKILL):
+        theirs, ours = os.pipe()
+        with open(os.devnull, "w") as nothing, os.fdopen(theirs) as typed:
+            files = (typed.fileno(), nothing.fileno(), nothing.fileno())
+            process = WarmProcess(
+                "json.tool", [], environment=os.environ, directory=Path.cwd(), files=files
+            )
+        with os.fdopen(ours, "wb") as typing:
+            assert process.poll() is None
+            with pytest.raises(subprocess.TimeoutExpired):
+                process.wait(0.01)
+            if number is None:
+                typing.write(b"[]")
+            else:
+                process.send_signal(number)
+                assert process.wait(60) == -number
+        assert process.wait(60) == (0 if number is None else -number)
+        process.kill()
+
+
+def test_ros_can_be_hidden() -> None:
+    hidden = run("rclpy.utilities", ros=False)
+    assert hidden.returncode == 1
+    assert "rclpy" in hidden.stderr
+
+
+def test_what_differs_from_its_first_line_on_is_started_as_usual() -> None:
+    assert can_start(os.environ | {"HOME": "/nowhere", "ROS_DOMAIN_ID": "7"})
+    assert not can_start(os.environ | {"PYTHONIOENCODING": "ascii"})
+    assert not can_start(os.environ | {"PYTHONPATH": "/somewhere/else"})
+    with pytest.raises(AssertionError, match="starts as usual"):
+        run("json.tool", LC_ALL="of nowhere")
