@@ -545,7 +545,9 @@ def test_a_tree_that_breaks_a_rule_is_not_published_unless_it_is_mended(
         assert "is not published, and the tree before it stays" in answer.message
         assert "it breaks 'never go when x < 2': where x = " in answer.message
         assert not (tmp_path / "learned" / "tree.json").exists()
-        _set(peer, repair=True)
+        _set(peer, repair=True, rules_file=str(tmp_path / "none.yaml"))
+        _status(peer, "none.yaml is not there, so that no tree is published")
+        _set(peer, rules_file=str(rules))
         answer = peer.call("/learner/relearn")
         assert answer.success, answer.message
         assert "Guards make it keep its rules: " in answer.message

@@ -252,6 +252,16 @@ class LearnerNode(Node):
                 f"held-out rows, and keep_if_better is set: {stays}"
             )
 
+    def _unruled(self) -> str:
+        """Why no tree can be proven to keep its rules, without a full stop; empty for none."""
+        try:
+            file = self._settings.rules.file()
+            if file is not None and not Path(file).is_file():
+                return f"rules_file {file} is not there, so that no tree is published"
+        except (RebtError, OSError, ValueError) as err:
+            return f"rules_file cannot be read ({err}), so that no tree is published"
+        return ""
+
     def _keeping_rules(self, learned: LearnedTree) -> LearnedTree:
         """The tree, which was learned before.
 
@@ -438,8 +448,8 @@ class LearnerNode(Node):
             "trees",
             "executors without a parameter 'learner' follow one by chance; stop all but one",
         )
-        uncounted = [Finding(self._uncounted, waits=False)] if self._uncounted else []
-        problems = self._watch.say([*several, *uncounted])
+        unfit = [Finding(one, waits=False) for one in (self._uncounted, self._unruled()) if one]
+        problems = self._watch.say([*several, *unfit])
         if problems:
             return Report(Level.WARN, "; ".join((self._last.message, *problems)), values)
         return Report(self._last.level, self._last.message, values)
