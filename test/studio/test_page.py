@@ -114,7 +114,20 @@ def test_an_empty_studio_says_what_to_do_next(chromium: Browser, studio: Pretend
         chromium.section(section)
         chromium.sees(hint, f"#panel-{section}")
     assert not chromium.one("#learn").is_enabled()
+    assert not chromium.one("#learn-rollback").is_enabled()
+    studio.board.replace(Section.DEMONSTRATIONS, {NAMES[0]: demonstration(time.time())})
+    chromium.section("live")
+    chromium.sees("✓ The robot was shown what to do, in 1 demonstration.", "#live-empty")
+    studio.board.replace(Section.DEMONSTRATIONS, {})
+    chromium.sees("1. Go to Teach", "#live-empty")
     assert chromium.errors() == []
+
+
+def test_what_is_in_trouble_is_said_beside_the_tree(page: Browser, studio: Pretend) -> None:
+    studio.board.update(Section.NODES, {"executor": node("no state arrives", level="ERROR")})
+    page.sees("executor: No state arrives.", "#live-advice")
+    studio.board.update(Section.NODES, {"executor": node("ticking")})
+    page.until(lambda: not page.one("#live-advice").is_displayed())
 
 
 def test_the_live_tree_tells_statuses_values_and_the_command(page: Browser) -> None:
@@ -242,6 +255,20 @@ def test_every_control_has_a_name(seen: Browser) -> None:
                .map(one => one.outerHTML.slice(0, 200))"""
         )
         assert nameless == []
+
+
+def test_every_button_says_what_it_will_do(seen: Browser) -> None:
+    for section in SECTIONS:
+        seen.section(section)
+        if section == "curate":
+            seen.press_node("#curate-tree", "0.1")
+            seen.one("#editor .histogram")
+        silent = seen.run(
+            """return [...document.querySelectorAll('main button, header button')]
+               .filter(one => one.checkVisibility() && !one.title && one.role !== 'tab')
+               .map(one => one.outerHTML.slice(0, 200))"""
+        )
+        assert silent == []
 
 
 def test_controls_are_large_enough_for_a_finger(seen: Browser) -> None:

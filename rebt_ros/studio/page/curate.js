@@ -77,7 +77,7 @@ export class Curate {
     for (const verb of ["undo", "redo"]) {
       const words = verb === "undo" ? "Undo" : "Redo";
       setText(byId(verb), draft[verb] ? `${words}: ${draft[verb]}` : `Nothing to ${verb}`);
-      setAttribute(byId(verb), "title", draft[verb] ? `${words}: ${draft[verb]}` : null);
+      setAttribute(byId(verb), "title", draft[verb] ? `${words}: ${draft[verb]}` : `There is nothing to ${verb}`);
       byId(verb).disabled = !draft[verb];
     }
     byId("reset").disabled = !draft.undo;
@@ -143,6 +143,7 @@ export class Curate {
         setText(part.title, one.heading);
         setText(part.state, one.attached ? "✓ In the draft" : "");
         setText(part.toggle, one.attached ? "Take it out of the draft" : "Put it into the draft");
+        setAttribute(part.toggle, "title", one.attached ? "Removes this branch from the draft" : "Adds this branch to the draft; the robot gets it once you publish");
         part.toggle.classList.toggle("primary", !one.attached);
         child.classList.toggle("attached", one.attached);
         child.suggestion = one;
@@ -201,7 +202,7 @@ export class Curate {
       byId("versions"),
       versions,
       (number) => {
-        const back = button("Bring it back", () => this.ask("restore", { version: number }));
+        const back = button("Bring it back", () => this.ask("restore", { version: number }), { title: "Publishes this tree to the robot again" });
         return element("li", {}, element("strong"), element("span", { class: "what" }), element("span", { class: "hint" }), back);
       },
       (child, version, key) => {

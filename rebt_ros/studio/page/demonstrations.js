@@ -55,10 +55,18 @@ export class Demonstrations {
       const back = () => ask(kept ? "take_in" : "leave_out", { name });
       ask(kept ? "leave_out" : "take_in", { name }, { undo: back });
     });
-    part.trim = button("Trim ends", () => this.edit(item, name, "trim"), { "aria-expanded": "false" });
-    part.split = button("Split in two", () => this.edit(item, name, "split"), { "aria-expanded": "false" });
-    part.remove = button("Delete", () => ask("delete", { name }, { undo: restore }));
-    part.back = button("Undo delete", restore, { class: "primary" });
+    part.trim = button("Trim ends", () => this.edit(item, name, "trim"), {
+      "aria-expanded": "false",
+      title: "Shows where to cut off its beginning and its end",
+    });
+    part.split = button("Split in two", () => this.edit(item, name, "split"), {
+      "aria-expanded": "false",
+      title: "Shows where to make two demonstrations of it",
+    });
+    part.remove = button("Delete", () => ask("delete", { name }, { undo: restore }), {
+      title: "Deletes it; for ten minutes it can be restored",
+    });
+    part.back = button("Undo delete", restore, { class: "primary", title: "Restores it as it was" });
     part.buttons.append(part.take, part.trim, part.split, part.remove, part.back);
     return item;
   }
@@ -75,6 +83,7 @@ export class Demonstrations {
     setAttribute(part.picture, "title", `Look inside ${name}`);
     setText(part.notes, (shown.notes ?? []).map(sentence).join(" "));
     setText(part.take, shown.kept ? "Leave out" : "Take in again");
+    setAttribute(part.take, "title", shown.kept ? "Nothing is learned from it; it is kept" : "It is learned from again");
     show(part.notes, Boolean(shown.notes?.length));
     for (const one of [part.trim, part.split]) one.disabled = shown.rows < 2;
     for (const one of [part.take, part.trim, part.split, part.remove]) show(one, !shown.deleted);

@@ -58,8 +58,8 @@ export class Editor {
       "div",
       { class: "choice" },
       element("h3", {}, "How do these actions run?"),
-      button("All at the same time (Parallel)", () => choose("parallel"), { "aria-pressed": String(is("Parallel")) }),
-      button("The first one that can (Selector)", () => choose("selector"), { "aria-pressed": String(is("Selector")) }),
+      button("All at the same time (Parallel)", () => choose("parallel"), { "aria-pressed": String(is("Parallel")), title: "The draft does all of them at once" }),
+      button("The first one that can (Selector)", () => choose("selector"), { "aria-pressed": String(is("Selector")), title: "The draft does the first, or the next where that fails" }),
     );
   }
 
@@ -72,7 +72,10 @@ export class Editor {
     const within = this.view.nodes.filter((other) => other.path.startsWith(`${node.path}.`)).length;
     const earlier = button("◀ Earlier", () => move(-1), { title: "Is tried before its neighbor on the left" });
     const later = button("Later ▶", () => move(1), { title: "Is tried after its neighbor on the right" });
-    const remove = button(within ? `Delete this branch of ${within + 1} nodes` : "Delete this node", () => this.ask("remove", { path: node.path }, { undo }), { class: "careful" });
+    const remove = button(within ? `Delete this branch of ${within + 1} nodes` : "Delete this node", () => this.ask("remove", { path: node.path }, { undo }), {
+      class: "careful",
+      title: "Deletes it from the draft; Undo brings it back",
+    });
     earlier.disabled = isRoot || place === 0;
     later.disabled = isRoot || place === siblings.length - 1;
     remove.disabled = isRoot;

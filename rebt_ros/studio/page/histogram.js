@@ -96,8 +96,11 @@ export class Histogram {
       "aria-label": label,
       input: () => field.value !== "" && set(Number(field.value), true),
     });
-    const apply = button("", () => this.change(value, end), { class: "primary" });
-    const back = button("Put it back", () => set(before));
+    const apply = button("", () => this.change(value, end), {
+      class: "primary",
+      title: "Changes the draft; the robot gets it once you publish",
+    });
+    const back = button("Put it back", () => set(before), { title: "The threshold is where it was" });
     const set = (to, typed = false) => {
       value = typed ? to : Number(to.toPrecision(4));
       const x = this.x(Math.min(Math.max(value, this.low), this.high));

@@ -9,7 +9,7 @@ import { count, percent, sentence } from "./words.js";
 
 /** The section. */
 export class Learn {
-  sections = ["nodes", "demonstrations", "learning", "draft", "tree", "names"];
+  sections = ["nodes", "demonstrations", "learning", "draft", "tree", "names", "versions"];
 
   constructor({ state, ask }) {
     this.state = state;
@@ -33,7 +33,7 @@ export class Learn {
   }
 
   render(changed) {
-    if (["nodes", "demonstrations", "learning"].some((one) => changed.has(one))) this.progress();
+    if (["nodes", "demonstrations", "learning", "versions"].some((one) => changed.has(one))) this.progress();
     const learning = this.state.get("learning");
     const draft = this.state.get("draft");
     const hasLevels = (learning.levels ?? []).length > 0;
@@ -73,7 +73,8 @@ export class Learn {
     else if (!rows) words = "There is nothing to learn from yet: go to Teach and show the robot what to do.";
     setText(byId("learn-from"), words);
     show(byId("learn-cancel"), works);
-    byId("learn-rollback").disabled = !isThere || works;
+    const earlier = Object.keys(this.state.get("versions")).length > 1;
+    byId("learn-rollback").disabled = !isThere || works || !earlier;
     const awaited = !works && this.state.get("learning").awaited === true;
     show(byId("learn-progress"), works || awaited);
     if (awaited) {

@@ -6,7 +6,7 @@ import { isNumeric, marginText, range, read, readText, share } from "./margins.j
 import { Strip } from "./strip.js";
 import { Tree, actingPaths, calm, treeTools } from "./tree.js";
 import { showNoWhy, showWhy } from "./why.js";
-import { number, sentence } from "./words.js";
+import { count, number, sentence } from "./words.js";
 
 const CONDITIONS = {
   running: "The tree drives the robot",
@@ -20,7 +20,7 @@ const CONDITIONS = {
 
 /** The section. */
 export class Live {
-  sections = ["nodes", "tree", "run", "values", "timeline", "names"];
+  sections = ["nodes", "tree", "run", "values", "timeline", "names", "demonstrations"];
 
   constructor({ state, ask, visit }) {
     this.state = state;
@@ -61,9 +61,11 @@ export class Live {
     if (changed.has("tree") || changed.has("names")) {
       show(byId("live-empty"), !view);
       show(byId("live-full"), Boolean(view));
+      this.firstStep ??= [...byId("live-shown").childNodes];
       if (view) this.tree.show(view, this.state.get("names"));
       setText(byId("live-summary"), this.state.get("tree").summary ?? "");
     }
+    if (changed.has("demonstrations") || changed.has("tree")) this.shown();
     if (this.moment && !changed.has("moment") && !changed.has("tree")) return;
     const { statuses, values, commands } = this.scene;
     this.command(commands);
@@ -75,6 +77,13 @@ export class Live {
       this.showChosen(values);
     }
     if (changed.has("nodes")) this.advise();
+  }
+
+  /** Whether the first step to a tree is done. */
+  shown() {
+    const kept = Object.values(this.state.get("demonstrations")).filter((one) => one.kept && !one.deleted);
+    const done = element("span", {}, `✓ The robot was shown what to do, in ${count(kept.length, "demonstration")}.`);
+    byId("live-shown").replaceChildren(...(kept.length ? [done] : this.firstStep));
   }
 
   command(commands) {
@@ -106,15 +115,15 @@ export class Live {
     );
   }
 
-  /** What to do next, where nothing runs. */
+  /** What is missing or in trouble, and what to do about it. */
   advise() {
     const { nodes } = this.state.sections;
-    const missing = ["executor", "recorder", "learner"].filter((role) => nodes[role] && !nodes[role].there);
+    const missing = ["executor", "recorder", "learner"].filter((role) => nodes[role] && nodes[role].level !== "OK");
     keyed(
       byId("live-advice"),
       missing.map((role) => [role, nodes[role]]),
       () => element("li"),
-      (child, node) => setText(child, sentence(node.message)),
+      (child, node, role) => setText(child, node.there ? `${role}: ${sentence(node.message)}` : sentence(node.message)),
     );
     show(byId("live-advice"), missing.length > 0);
   }

@@ -2,7 +2,7 @@
 
 import { fillOf, inkOf } from "./colors.js";
 import { button, element, setAttribute, setText } from "./dom.js";
-import { ago, clock } from "./words.js";
+import { ago, clock, count } from "./words.js";
 
 const SPANS = [60, 600];
 const [ROW, GAP, AXIS, GUTTER] = [30, 4, 22, 62];
@@ -35,13 +35,15 @@ export class Strip {
       pointermove: (event) => event.buttons && this.drag(event),
     });
     this.words = element("span", { class: "strip-words" });
-    this.pause = button("Pause", () => this.go(this.time === null ? this.state.now() : null));
+    this.pause = button("Pause", () => this.go(this.time === null ? this.state.now() : null), {
+      title: "The page stands still; the robot goes on",
+    });
     this.spans = SPANS.map((span) => {
       const look = () => {
         this.span = span;
         this.draw();
       };
-      return button(`${span / 60} min`, look);
+      return button(`${span / 60} min`, look, { title: `Shows the last ${count(span / 60, "minute")}` });
     });
     host.append(
       element(

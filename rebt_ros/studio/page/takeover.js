@@ -86,6 +86,7 @@ export class Takeover {
       {
         type: "button",
         class: "act",
+        title: "Hold it: the robot does this until you let go",
         pointerdown: (event) => {
           if (event.button > 0) return;
           // The finger may slide off the button; only lifting it lets go.

@@ -16,8 +16,14 @@ export class Teach {
     this.takeover = new Takeover({ state, ask });
     this.takeover.refused = (message) => say(message, { bad: true });
     this.demonstrations = new Demonstrations({ state, ask, visit });
-    this.on = button("Start recording", () => ask("record", { on: true }), { class: "primary big" });
-    this.off = button("Stop recording", () => ask("record", { on: false }), { class: "big" });
+    this.on = button("Start recording", () => ask("record", { on: true }), {
+      class: "primary big",
+      title: "From now on all that is done is recorded",
+    });
+    this.off = button("Stop recording", () => ask("record", { on: false }), {
+      class: "big",
+      title: "Keeps this demonstration, and records no more",
+    });
     this.next = button("Well done: next one", () => ask("new_demonstration"), {
       class: "primary big",
       title: "Keeps this demonstration; the next action begins another one",

@@ -472,14 +472,13 @@ export function treeTools(tree, { jump = null } = {}) {
       if (event.key === "Enter") look(event.shiftKey ? -1 : 1);
     },
   });
-  const tool = (text, click, label) =>
-    element("button", { type: "button", click, ...(label ? { "aria-label": label, title: label } : {}) }, text);
+  const tool = (text, click, label) => element("button", { type: "button", click, "aria-label": label, title: label }, text);
   return element(
     "div",
     { class: "tools" },
     field,
     found,
-    jump ? tool("Jump to what runs", jump) : null,
+    jump ? tool("Jump to what runs", jump, "Jump to what runs: shows the action in the tree") : null,
     element(
       "span",
       { class: "group" },
