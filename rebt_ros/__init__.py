@@ -59,6 +59,7 @@ if TYPE_CHECKING:
         Literal,
         PreviousActionIs,
         Threshold,
+        WeightedSum,
     )
     from rebt_ros.offline.learning_from_files import learn
     from rebt_ros.offline.replay_over_files import replay
@@ -123,6 +124,7 @@ __all__ = [
     "Threshold",
     "Upsampling",
     "Use",
+    "WeightedSum",
     "learn",
     "load_learning",
     "py_trees_nodes",
@@ -188,6 +190,7 @@ _HOMES = {
     "Threshold": "rebt_ros.logic.conditions",
     "Upsampling": "rebt_ros.decision_tree.upsampling",
     "Use": "rebt_ros.learning.options",
+    "WeightedSum": "rebt_ros.logic.conditions",
     "learn": "rebt_ros.offline.learning_from_files",
     "load_learning": "rebt_ros.learning.learning_file",
     "py_trees_nodes": "rebt_ros.learning.py_trees_form",

@@ -43,6 +43,7 @@ from rebt_ros.logic.conditions import (
     PreviousActionIs,
     Quantity,
     Threshold,
+    WeightedSum,
     features_of,
 )
 from rebt_ros.logic.dnf import Conjunction, Dnf, conditions_of
@@ -56,9 +57,11 @@ FEATURES = (
 )
 #: What remains to be driven with the charge that is left, say.
 DIFFERENCE = Difference("distance", "battery")
+#: What the way is worth, say, of which charge takes a part.
+SUM = WeightedSum((("distance", -0.7), ("battery", 1.3)))
 #: What trees may test beside `FEATURES`.
 LAT, PREVIOUS = Vocabulary(History.LAST), Vocabulary(History.PREVIOUS)
-EVERYTHING = Vocabulary(History.PREVIOUS, (DIFFERENCE,))
+EVERYTHING = Vocabulary(History.PREVIOUS, (DIFFERENCE, SUM))
 LABELS = ("go", "grasp", "turn", "wait")
 ACTIONS = tuple(nodes.Action(label, CHANNEL) for label in LABELS)
 #: Tenths are not exact in binary.
@@ -149,7 +152,15 @@ def _satisfied(
     values = [state[place] for place in places]
     if any(map(math.isnan, values)):
         return False
-    value = values[0] - values[1] if len(values) == 2 else values[0]
+    value = values[0]
+    match condition:
+        case Threshold(quantity=Difference()) | Interval(quantity=Difference()):
+            value = values[0] - values[1]
+        case (
+            Threshold(quantity=WeightedSum(terms=((_, first), (_, second))))
+            | Interval(quantity=WeightedSum(terms=((_, first), (_, second))))
+        ):
+            value = first * values[0] + second * values[1]
     match condition:
         case Threshold(value=threshold):
             return value <= threshold
@@ -176,8 +187,8 @@ def assignments(*rules: Dnf) -> Iterator[frozenset[Condition]]:
 # --- logic ------------------------------------------------------------------------------------
 
 
-#: Numeric features, and what differs between them.
-quantities: st.SearchStrategy[Quantity] = st.sampled_from(("distance", "battery", DIFFERENCE))
+#: Numeric features, and what is computed from them.
+quantities: st.SearchStrategy[Quantity] = st.sampled_from(("distance", "battery", DIFFERENCE, SUM))
 
 
 def thresholds(quantity: Quantity | None = None) -> st.SearchStrategy[Threshold]:
@@ -254,7 +265,9 @@ few_conditions = st.sampled_from(
 threshold_dnfs = dnfs(st.one_of(thresholds(), thresholds("distance"), st.just(IsTrue("docked"))))
 
 
-vocabularies = st.builds(Vocabulary, st.sampled_from(History), st.sampled_from(((), (DIFFERENCE,))))
+vocabularies = st.builds(
+    Vocabulary, st.sampled_from(History), st.sampled_from(((), (DIFFERENCE,), (SUM, DIFFERENCE)))
+)
 
 
 # --- states and tables ------------------------------------------------------------------------
@@ -380,7 +393,12 @@ def _conditions_on(
         st.builds(PreviousActionIs, st.sampled_from(labels)),
     ]
     called = [one.name for one in declared]
-    compared: list[Quantity] = [*called, *itertools.starmap(Difference, _pairs(called))]
+    pairs = _pairs(called)
+    compared: list[Quantity] = [*called, *itertools.starmap(Difference, pairs)]
+    compared += [WeightedSum(((one, 0.1), (other, -2.5))) for one, other in pairs]
+    if len(called) > 2:
+        weights = itertools.cycle((-1.0, 1e-9))
+        compared.append(WeightedSum(tuple(zip(called, weights, strict=False))))
     for quantity in compared:
         kinds.append(st.builds(Threshold, st.just(quantity), finite))
         kinds.append(ends.map(lambda between, its=quantity: Interval(its, *between)))

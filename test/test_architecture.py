@@ -88,6 +88,7 @@ HOMES: Final = {
     "scipy": (
         "rebt_ros.study.edit_distance.integer_program",
         "rebt_ros.study.edit_distance.relaxation",
+        "rebt_ros.verification.linear_bounds",
     ),
     "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
     "yaml": ("rebt_ros.robot_file.*", "rebt_ros.verification.rules_file"),

@@ -23,6 +23,7 @@ from rebt_ros.logic.conditions import (
     Quantity,
     StateCondition,
     Threshold,
+    WeightedSum,
 )
 
 
@@ -72,7 +73,7 @@ class StateTests:
         """What reads a quantity.
 
         Raises:
-            KeyError: It is another feature, or a difference of others.
+            KeyError: It is another feature, or computed from others.
         """
         return cast(Reading, self._read(quantity))
 
@@ -98,11 +99,25 @@ class StateTests:
                 return lambda values: values[place] == code
 
     def _read(self, quantity: Quantity) -> Callable[[Any], Any]:
-        if isinstance(quantity, Difference):
-            minuend, subtrahend = self._place(quantity.minuend), self._place(quantity.subtrahend)
-            return lambda values: values[minuend] - values[subtrahend]
-        place = self._place(quantity)
-        return lambda values: values[place]
+        match quantity:
+            case Difference():
+                minuend, subtrahend = map(self._place, (quantity.minuend, quantity.subtrahend))
+                return lambda values: values[minuend] - values[subtrahend]
+            case WeightedSum(terms=((first, weight), *others)):
+                start = self._place(first)
+                more = [(self._place(name), its) for name, its in others]
+
+                def read(values: Any) -> Any:
+                    total = weight * values[start]
+                    for place, its in more:
+                        total = total + its * values[place]
+                    return total
+
+                return read
+            case str():
+                place = self._place(quantity)
+                return lambda values: values[place]
+        raise AssertionError(quantity)
 
     def _place(self, name: str) -> int:
         return self._features[name][0]

@@ -40,6 +40,8 @@ from rebt_ros.logic.conditions import (
     PreviousActionIs,
     Quantity,
     Threshold,
+    WeightedSum,
+    features_in,
 )
 from rebt_ros.robot_file.errors import RobotFileError
 from rebt_ros.robot_file.reading import CarriedRobotFile
@@ -168,15 +170,27 @@ class _SpanOrCategories(Form[ShownValues]):
 
 
 def _comparison(kind: type[Any], *ends: Field[Any]) -> Record[Any]:
-    """The form of a test on a quantity: one feature, or one less another."""
+    """The form of a test on a quantity: one feature, one less another, or a weighted sum."""
 
-    def make(feature: str, minus: str | None = None, **bounds: float) -> Any:
-        return kind(feature if minus is None else Difference(feature, minus), **bounds)
+    def make(
+        feature: str,
+        minus: str | None = None,
+        weight: float | None = None,
+        plus: tuple[tuple[str, float], ...] | None = None,
+        **bounds: float,
+    ) -> Any:
+        if weight is None and plus is None:
+            return kind(feature if minus is None else Difference(feature, minus), **bounds)
+        if weight is None or plus is None or minus is not None:
+            raise ValueError(
+                f"a test on {feature!r} has either 'minus', or both 'weight' and 'plus', or none"
+            )
+        return kind(WeightedSum(((feature, weight), *plus)), **bounds)
 
     return Record(
         kind,
         (
-            Field("feature", Text(), get=lambda test: _minuend(test.quantity)),
+            Field("feature", Text(), get=lambda test: features_in(test.quantity)[0]),
             Field(
                 "minus",
                 Text(),
@@ -185,18 +199,56 @@ def _comparison(kind: type[Any], *ends: Field[Any]) -> Record[Any]:
                 omitted=True,
                 description="The test is about the feature less this other one.",
             ),
+            Field(
+                "weight",
+                Number(),
+                get=lambda test: _weight(test.quantity),
+                default=None,
+                omitted=True,
+                description="Of the feature in a weighted sum; not 0.",
+            ),
+            Field(
+                "plus",
+                Array(_TERM, 1),
+                get=lambda test: _further(test.quantity),
+                default=None,
+                omitted=True,
+                description="The test is about the feature times its weight, plus each of these "
+                "times its own, in this order.",
+            ),
             *ends,
         ),
         make=make,
+        rules={
+            "dependentRequired": {"weight": ["plus"], "plus": ["weight"]},
+            "not": {"required": ["minus", "plus"]},
+        },
     )
 
 
-def _minuend(quantity: Quantity) -> str:
-    return quantity.minuend if isinstance(quantity, Difference) else quantity
+_TERM: Final[Form[tuple[str, float]]] = Named(
+    "term",
+    Record(
+        tuple,
+        (
+            Field("feature", Text(), get=lambda term: term[0]),
+            Field("weight", Number(), get=lambda term: term[1], description="Not 0."),
+        ),
+        make=lambda feature, weight: (feature, weight),
+    ),
+)
 
 
 def _subtrahend(quantity: Quantity) -> str | None:
     return quantity.subtrahend if isinstance(quantity, Difference) else None
+
+
+def _weight(quantity: Quantity) -> float | None:
+    return quantity.terms[0][1] if isinstance(quantity, WeightedSum) else None
+
+
+def _further(quantity: Quantity) -> tuple[tuple[str, float], ...] | None:
+    return quantity.terms[1:] if isinstance(quantity, WeightedSum) else None
 
 
 _TEST: Final[Form[Any]] = Named(

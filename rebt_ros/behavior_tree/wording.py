@@ -7,7 +7,8 @@ Two different conditions of one tree never read the same:
 - A threshold, or end of an interval, is rounded, but never past the middle between it and the next
   one on the same quantity, so the numbers stay distinct and in order.
 - The difference of two features reads ``left ≤ right`` where its threshold is 0, and
-  ``left − right ≤ 0.3`` elsewhere.
+  ``left − right ≤ 0.3`` elsewhere.  A weighted sum reads ``angle + 0.4 × spin ≤ 0.02``, with every
+  digit of its weights.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from rebt_ros.logic.conditions import (
     PreviousActionIs,
     Quantity,
     Threshold,
+    WeightedSum,
 )
 
 #: Significant digits of a rounded threshold, unless more are needed to tell it from another one.
@@ -314,9 +316,23 @@ def feature_text(name: str) -> str:
 
 def quantity_text(quantity: Quantity) -> str:
     """What a threshold compares."""
-    if isinstance(quantity, Difference):
-        return f"{feature_text(quantity.minuend)} − {feature_text(quantity.subtrahend)}"
-    return feature_text(quantity)
+    match quantity:
+        case Difference(minuend=one, subtrahend=other):
+            return f"{feature_text(one)} − {feature_text(other)}"
+        case WeightedSum(terms=((first, weight), *others)):
+            texts = [f"{'−' if weight < 0 else ''}{_term_text(first, weight)}"]
+            for name, its in others:
+                texts.append(f"{'−' if its < 0 else '+'} {_term_text(name, its)}")
+            return " ".join(texts)
+        case str():
+            return feature_text(quantity)
+    raise AssertionError(quantity)
+
+
+def _term_text(name: str, weight: float) -> str:
+    """A feature with the size of its weight, every digit of it, or alone where that is 1."""
+    size = repr(abs(weight)).removesuffix(".0")
+    return feature_text(name) if size == "1" else f"{size} × {feature_text(name)}"
 
 
 def _word(name: str) -> str:
@@ -334,7 +350,8 @@ def _is_plain(name: str) -> bool:
         and _SIGNS.isdisjoint(name)
         and not (lower.startswith("not") and not _continues_word(lower[3:]))
         and not lower.startswith(("last action", "doing "))
-        and " − " not in name
+        and not name.startswith("−")
+        and not any(sign in name for sign in (" − ", " + ", " × "))
         and not lower.endswith((" is known", " is missing"))
         and " (before " not in lower
         and " @" not in name
@@ -392,9 +409,14 @@ def _exactly(literal: Literal) -> str:
 
 
 def _quoted_quantity(quantity: Quantity) -> str:
-    if isinstance(quantity, Difference):
-        return f"{_quoted(quantity.minuend)} - {_quoted(quantity.subtrahend)}"
-    return _quoted(quantity)
+    match quantity:
+        case Difference(minuend=one, subtrahend=other):
+            return f"{_quoted(one)} - {_quoted(other)}"
+        case WeightedSum(terms=terms):
+            return " + ".join(f"{weight!r} * {_quoted(name)}" for name, weight in terms)
+        case str():
+            return _quoted(quantity)
+    raise AssertionError(quantity)
 
 
 def _resuming(memory: bool) -> str:

@@ -62,6 +62,7 @@ _ASKED = (
     "level",
     "history",
     "differences",
+    "sums",
     "reaction_time",
     "leave_out_mistakes",
     "readable_thresholds",
@@ -262,6 +263,14 @@ def _add_vocabulary(parser: argparse.ArgumentParser) -> None:
         metavar=_values(Use),
         help="whether the tree may compare two features, as in left < right; auto: where that "
         "makes it a quarter smaller at the same agreement (default: auto)",
+    )
+    learning.add_argument(
+        "--sums",
+        type=word_of(Use),
+        metavar=_values(Use),
+        help="whether the tree may weigh features against each other, as in "
+        "angle + 0.4 × spin > 0.02; auto: where that takes less to describe what was shown "
+        "(default: auto)",
     )
 
 

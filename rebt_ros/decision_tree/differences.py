@@ -52,12 +52,12 @@ def likely_differences(
         return ()
     step = -(-len(table) // _MOST_ROWS)
     some = table.where(np.arange(len(table)) % step == 0)
-    every = Vocabulary(vocabulary.history, possible)
+    every = vocabulary.with_more(possible)
     from sklearn.tree import DecisionTreeClassifier
 
     classifier = DecisionTreeClassifier(random_state=random_state)
     classifier.fit(encode(some, every), some.chosen, sample_weight=some.row_weights)
-    first = len(columns(table, FEATURES_ALONE))
+    first = len(columns(table, FEATURES_ALONE)) + len(vocabulary.combinations)
     shares = classifier.feature_importances_[first : first + len(possible)]
     ranked = np.argsort(-shares, kind="stable")[:_MOST_DIFFERENCES]
     return tuple(possible[place] for place in sorted(ranked) if shares[place] >= _LEAST_SHARE)

@@ -1,14 +1,15 @@
 """The table as the matrix that scikit-learn learns from, and back: what each column asks.
 
 vocabulary
-    What a tree may test beside the features: differences of two of them, and a history.
+    What a tree may test beside the features: combinations of several of them, and a history.
 
-A numeric feature is one column, a binary one and a difference as well; a categorical feature and
+A numeric feature is one column, a binary one and a combination as well; a categorical feature and
 the history have one column for each category and action (one-hot).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +21,8 @@ from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import (
     KNOWN,
+    Combination,
     Condition,
-    Difference,
     HasCategory,
     IsTrue,
     LastActionIs,
@@ -33,6 +34,8 @@ from rebt_ros.logic.conditions import (
 
 #: Stands for a missing number: larger than all that are not, as ``missing <= x`` is false.
 MISSING = float(np.finfo(np.float32).max)
+#: Combinations reach no farther, and stay on the same side of all thresholds.
+_FARTHEST = 0.3 * MISSING
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,11 @@ class Vocabulary:
     """What a decision tree may test beside the features."""
 
     history: History = History.NONE
-    differences: tuple[Difference, ...] = ()
+    combinations: tuple[Combination, ...] = ()
+
+    def with_more(self, combinations: Iterable[Combination]) -> Vocabulary:
+        """The same with more combinations behind those that it has."""
+        return Vocabulary(self.history, (*self.combinations, *combinations))
 
 
 FEATURES_ALONE = Vocabulary()
@@ -82,7 +89,7 @@ def columns(table: DemonstrationTable, vocabulary: Vocabulary) -> tuple[Number |
             asked += [
                 Indicator(HasCategory(feature.name, category)) for category in feature.categories
             ]
-    asked += map(Number, vocabulary.differences)
+    asked += map(Number, vocabulary.combinations)
     match vocabulary.history:
         case History.PREVIOUS:
             asked += [Indicator(PreviousActionIs(action)) for action in table.actions]
@@ -107,7 +114,7 @@ def encode(
         len(one.categories) if one.kind is FeatureKind.CATEGORICAL else 1 for one in table.features
     ]
     history = history_of(table, vocabulary)
-    width = sum(widths) + len(vocabulary.differences)
+    width = sum(widths) + len(vocabulary.combinations)
     width += 0 if history is None else len(table.actions)
     # Filled in place: large tables are held once.  Column by column, as trees are fitted.
     states = table.states[rows]
@@ -124,8 +131,9 @@ def encode(
         else:
             _one_hot(values, matrix[:, start:end])
     tests = StateTests(table.features)
-    for place, difference in enumerate(vocabulary.differences, start=end):
-        _number(tests.reading(difference)(states.T), matrix[:, place])
+    for place, combination in enumerate(vocabulary.combinations, start=end):
+        computed = tests.reading(combination)(states.T)
+        _number(np.clip(computed, -_FARTHEST, _FARTHEST), matrix[:, place])
     if history is not None:
         encode_history(matrix, history[rows], len(table.actions))
     return whole

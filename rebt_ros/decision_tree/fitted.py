@@ -111,16 +111,29 @@ class FittedTree:
 
         Of equally small explanations it is the one with the fewest leaves.
         """
-        standing = self.path.standing(self._explaining()[1])
-        return np.asarray(
-            self.grown.majority[standing[_reached(self.grown, table, self.vocabulary)]]
-        )
+        return np.asarray(self.grown.majority[self.standing_explained[self.reached(table)]])
 
     @property
     def explaining_leaves(self) -> int:
         """Leaves of the tree of the explanation; the other part of its size are exceptions."""
-        standing = self.path.standing(self._explaining()[1])
-        return len(np.unique(standing[self.grown.left < 0]))
+        return len(np.unique(self.standing_explained[self.grown.left < 0]))
+
+    @property
+    def standing_explained(self) -> IntArray:
+        """For each node as grown, the one that decides in the tree of the explanation: (nodes,)."""
+        return self.path.standing(self._explaining()[1])
+
+    @property
+    def gains(self) -> FloatArray:
+        """How much impurity the splits by each column take away, shape (columns,)."""
+        grown = self.grown
+        split = np.flatnonzero(grown.left >= 0)
+        gains = grown.risk[split] - grown.risk[grown.left[split]] - grown.risk[grown.right[split]]
+        return np.bincount(grown.column[split], gains, len(self.asked)).astype(np.float64)
+
+    def reached(self, table: DemonstrationTable) -> IntArray:
+        """The leaf as grown that each row reaches, shape (rows,)."""
+        return _reached(self.grown, table, self.vocabulary)
 
     def _explaining(self) -> tuple[int, BoolArray]:
         """The size of the explanation, and which nodes are its leaves, or would be if reached."""
@@ -148,7 +161,7 @@ class FittedTree:
         # Parents come before their children.
         for node in range(1, len(depth)):
             depth[node] = depth[self.path.parents[node]] + 1
-        return np.asarray(depth[_reached(self.grown, table, self.vocabulary)])
+        return np.asarray(depth[self.reached(table)])
 
     def at(self, ccp_alpha: float) -> TrainedTree:
         """The tree as pruned at `ccp_alpha`; equal to scikit-learn's own fit with it."""
@@ -214,7 +227,7 @@ class FittedTree:
             Shape (levels, actions), in the order of the table's actions.
         """
         count = len(self.grown)
-        reached = _reached(self.grown, table, self.vocabulary)
+        reached = self.reached(table)
         actions = len(table.actions)
         counts = table.counts(reached * actions + table.chosen, count * actions)
         counts = self.path.passed(counts.reshape(count, actions))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from functools import reduce
 
 from rebt_ros.export.blackboard import Variable
 from rebt_ros.logic.conditions import (
@@ -19,6 +20,7 @@ from rebt_ros.logic.conditions import (
     Quantity,
     StateCondition,
     Threshold,
+    WeightedSum,
 )
 
 #: What subnormal numbers are scaled by, which is exact.
@@ -69,7 +71,13 @@ def test(condition: StateCondition, positive: bool, variables: Mapping[str, Vari
 
 
 def _read(quantity: Quantity, variables: Mapping[str, Variable]) -> str:
-    if isinstance(quantity, Difference):
-        minuend, subtrahend = variables[quantity.minuend], variables[quantity.subtrahend]
-        return f"({minuend.name} - {subtrahend.name})"
-    return variables[quantity].name
+    match quantity:
+        case Difference(minuend=minuend, subtrahend=subtrahend):
+            return f"({variables[minuend].name} - {variables[subtrahend].name})"
+        case WeightedSum(terms=terms):
+            # The engine reads no sign in front of a number.
+            products = (f"({number(weight)} * {variables[name].name})" for name, weight in terms)
+            return reduce(lambda total, product: f"({total} + {product})", products)
+        case str():
+            return variables[quantity].name
+    raise AssertionError(quantity)

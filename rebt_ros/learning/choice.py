@@ -7,6 +7,8 @@ What cross-validation decides, it decides on rows that a tree was not learned fr
   cross-validation says, or makes it no larger and raises the mean recall of unpruned trees after
   their own choices; of events that are sent when the action changes, which always differ from the
   one before, only where states hardly tell what to do;
+- whether it may test weighted sums of features: where they make the description of the rows shorter
+  (see `weighted_sums`), unless that costs both agreement and mean recall;
 - whether it may test differences of features, by agreement and size;
 - the pruning level, by mean recall, and by the size of the explanation where that leaves much open:
   pruning has to pay (see `judged_levels`);
@@ -24,12 +26,14 @@ from functools import partial
 import numpy as np
 
 from rebt_ros.arrays import BoolArray
+from rebt_ros.behavior_tree.wording import quantity_text
 from rebt_ros.decision_tree.differences import likely_differences
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.simplest import simplest
 from rebt_ros.decision_tree.training import fit
 from rebt_ros.decision_tree.upsampling import Upsampling
+from rebt_ros.decision_tree.weighted_sums import likely_sums
 from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import NO_ACTION, History
 from rebt_ros.demonstration.table import DemonstrationTable, part_of
@@ -58,11 +62,12 @@ _MUCH_SIMPLER = 0.8
 _HARDLY = 0.1
 
 #: How much agreement differences may cost, and to which share of the leaves they have to come.
+#: Weighted sums may cost as much agreement or as much mean recall.
 _DEARER, _SMALLER = 0.005, 0.75
 
-#: Steps of four cross-validations, of running the trees of two, and of running them with PSA nodes
+#: Steps of six cross-validations, of running the trees of two, and of running them with PSA nodes
 #: and without.
-_MOST_STEPS = 4 * (MOST_FOLDS + 1) + 2 * MOST_FOLDS + 2 * MOST_FOLDS
+_MOST_STEPS = 6 * (MOST_FOLDS + 1) + 2 * MOST_FOLDS + 2 * MOST_FOLDS
 
 
 class _Steps:
@@ -234,18 +239,50 @@ class _Choice:
 
     def vocabulary(self) -> Vocabulary:
         """What the tree may test beside the features."""
-        vocabulary = Vocabulary(self._history())
-        return replace(vocabulary, differences=self._differences(vocabulary))
+        states_alone = self._with_sums(FEATURES_ALONE)
+        vocabulary = replace(states_alone, history=self._history(states_alone))
+        if not vocabulary.combinations and vocabulary.history is not History.NONE:
+            # Where the same states ask for different actions, a line between them shows late.
+            vocabulary = self._with_sums(vocabulary)
+        return self._with_differences(vocabulary)
 
-    def _history(self) -> History:
+    def _with_sums(self, vocabulary: Vocabulary) -> Vocabulary:
+        """With the weighted sums that are worth it."""
+        options = self._options
+        if options.sums is Use.NEVER:
+            return vocabulary
+        # What a difference says needs no weights.
+        at_hand = vocabulary.with_more(self._likely_differences(vocabulary))
+        how = replace(fit_options(options, at_hand), upsample=Upsampling.NONE)
+        sums = likely_sums(self._telling, fit(self._telling, how), how)
+        with_them = vocabulary.with_more(sums)
+        if not sums or options.sums is Use.ALWAYS:
+            return with_them
+        choices = partial(own_history_choices, options=options, psa=False)
+        before, after = (
+            self.judged(one, telling=True).levels(choices) for one in (vocabulary, with_them)
+        )
+        agreements = float(before.means[before.chosen]), float(after.means[after.chosen])
+        recalls = before.mean_recalls[before.chosen], after.mean_recalls[after.chosen]
+        compared = (
+            f"{', '.join(map(quantity_text, sums))}: agreement {agreements[1]:.1%} instead of "
+            f"{agreements[0]:.1%}, mean recall {recalls[1]:.1%} instead of {recalls[0]:.1%}"
+        )
+        if all(now < then - _DEARER for then, now in (agreements, recalls)):
+            self.reasons.append(f"Weighted sums of features make no better tree ({compared}).")
+            return vocabulary
+        self.reasons.append(f"Weighted sums of features make a simpler tree ({compared}).")
+        return with_them
+
+    def _history(self, states_alone: Vocabulary) -> History:
         asked = self._options.history
         if asked is not None:
             return asked
-        with_it = Vocabulary(History.PREVIOUS)
-        before, after = (self._fitted(one).explanation for one in (FEATURES_ALONE, with_it))
+        with_it = replace(states_alone, history=History.PREVIOUS)
+        before, after = (self._fitted(one).explanation for one in (states_alone, with_it))
         compared = f"{after} leaves and exceptions explain the rows, {before} without it"
         if _always_changes(self._telling):
-            return self._history_of_changes(compared)
+            return self._history_of_changes(states_alone, compared)
         if after <= _MUCH_SIMPLER * before:
             self.reasons.append(f"The previous action is tested: {compared}.")
             return History.PREVIOUS
@@ -253,16 +290,16 @@ class _Choice:
             self.reasons.append(f"The previous action is not tested: {compared}.")
             return History.NONE
         if after == before:
-            states_alone, with_previous = (
-                simplest(self._telling, self._fitted(one)) for one in (FEATURES_ALONE, with_it)
+            without_it, with_previous = (
+                simplest(self._telling, self._fitted(one)) for one in (states_alone, with_it)
             )
-            if _simpler(with_previous, states_alone):
+            if _simpler(with_previous, without_it):
                 self.reasons.append(
                     f"The previous action is tested: {compared}, and {with_previous.comparisons} "
-                    f"comparisons of numbers do instead of {states_alone.comparisons}."
+                    f"comparisons of numbers do instead of {without_it.comparisons}."
                 )
                 return History.PREVIOUS
-        judged = self._unpruned()
+        judged = self._unpruned(states_alone)
         raised = clearly_raised(*judged)
         without, recall = (levels.mean_recalls[0] for levels in judged)
         self.reasons.append(
@@ -272,14 +309,14 @@ class _Choice:
         )
         return History.PREVIOUS if raised else History.NONE
 
-    def _history_of_changes(self, compared: str) -> History:
+    def _history_of_changes(self, states_alone: Vocabulary, compared: str) -> History:
         """Where the action of each row is another one than the previous action.
 
         That is a part of what each row does, whatever the state: of two actions, all of it.  So the
         size of an explanation by it tells nothing, and it is tested only where states hardly tell
         what to do.
         """
-        without, recall = (levels.mean_recalls[0] for levels in self._unpruned())
+        without, recall = (levels.mean_recalls[0] for levels in self._unpruned(states_alone))
         by_chance = 1 / len(np.unique(self._telling.chosen))
         tested = without < (by_chance + recall) / 2
         self.reasons.append(
@@ -290,11 +327,11 @@ class _Choice:
         )
         return History.PREVIOUS if tested else History.NONE
 
-    def _unpruned(self) -> tuple[JudgedLevels, JudgedLevels]:
+    def _unpruned(self, states_alone: Vocabulary) -> tuple[JudgedLevels, JudgedLevels]:
         """What unpruned trees are worth, by states alone and with the previous action."""
         without, with_it = (
             self.judged(vocabulary, telling=True).unpruned()
-            for vocabulary in (FEATURES_ALONE, Vocabulary(History.PREVIOUS))
+            for vocabulary in (states_alone, replace(states_alone, history=History.PREVIOUS))
         )
         return without, with_it
 
@@ -302,18 +339,22 @@ class _Choice:
         """Fitted to the rows that tell what a tree may test."""
         return fit(self._telling, fit_options(self._options, vocabulary))
 
-    def _differences(self, vocabulary: Vocabulary) -> tuple[Difference, ...]:
+    def _likely_differences(self, vocabulary: Vocabulary) -> tuple[Difference, ...]:
         options = self._options
         if options.differences is Use.NEVER:
             return ()
-        differences = likely_differences(
-            self._telling, vocabulary, options.units, options.random_state
-        )
+        return likely_differences(self._telling, vocabulary, options.units, options.random_state)
+
+    def _with_differences(self, vocabulary: Vocabulary) -> Vocabulary:
+        """With the differences that are worth it."""
+        options = self._options
+        differences = self._likely_differences(vocabulary)
+        more = vocabulary.with_more(differences)
         if options.differences is Use.ALWAYS or not differences:
-            return differences
+            return more
         choices = partial(own_history_choices, options=options, psa=False)
         without = self.judged(vocabulary, telling=True)
-        with_them = self.judged(replace(vocabulary, differences=differences), telling=True)
+        with_them = self.judged(more, telling=True)
         before, after = without.levels(choices), with_them.levels(choices)
         counts = [one.fitted.path.leaf_counts() for one in (without, with_them)]
         leaves = [
@@ -332,9 +373,9 @@ class _Choice:
         )
         if smaller and agreements[1] >= agreements[0] - _DEARER:
             self.reasons.append(f"Differences of features make a smaller tree ({compared}).")
-            return differences
+            return more
         self.reasons.append(f"Differences of features make no better tree ({compared}).")
-        return ()
+        return vocabulary
 
 
 def _choose_psa(

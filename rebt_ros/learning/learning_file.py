@@ -29,14 +29,14 @@ from rebt_ros.learning.judged_levels import JudgedLevels
 from rebt_ros.learning.learning import Learning, learned_as_asked
 from rebt_ros.learning.levels import Evidence
 from rebt_ros.learning.options import LearnOptions
-from rebt_ros.logic.conditions import Difference
+from rebt_ros.logic.conditions import combination
 from rebt_ros.storage.array_file import read_arrays, write_arrays
 
 #: Its name.
 NAME = "learning.npz"
 
 #: Of the words and arrays below.
-VERSION = 1
+VERSION = 2
 
 #: Values of a table that are kept at most: 100,000 rows of 20 features.
 MOST_VALUES = 2_000_000
@@ -104,7 +104,8 @@ class _Fit:
     """How a decision tree was fitted."""
 
     history: History
-    differences: tuple[tuple[str, str], ...]
+    combinations: tuple[tuple[tuple[str, float], ...], ...]
+    """The terms of each; those of a difference have the weights 1 and -1."""
     max_depth: int | None
     random_state: int
     notes: tuple[str, ...]
@@ -250,7 +251,7 @@ def _fit(fitted: FittedTree) -> _Fit:
     vocabulary = fitted.vocabulary
     return _Fit(
         vocabulary.history,
-        tuple((pair.minuend, pair.subtrahend) for pair in vocabulary.differences),
+        tuple(one.terms for one in vocabulary.combinations),
         fitted.max_depth,
         fitted.random_state,
         fitted.notes,
@@ -260,8 +261,7 @@ def _fit(fitted: FittedTree) -> _Fit:
 def _fitted(
     fit: _Fit, arrays: Mapping[str, npt.NDArray[Any]], table: DemonstrationTable
 ) -> FittedTree:
-    differences = tuple(Difference(*pair) for pair in fit.differences)
-    vocabulary = Vocabulary(fit.history, differences)
+    vocabulary = Vocabulary(fit.history, tuple(map(combination, fit.combinations)))
     asked = columns(table, vocabulary)
     grown = GrownTree(
         _of(arrays, "left", np.int64),

@@ -27,7 +27,7 @@ class Use(Enum):
     """Whether the executed tree has something."""
 
     AUTO = "auto"
-    """Only where cross-validation speaks for it (see `choice`)."""
+    """Only where the demonstrations speak for it (see `choice`)."""
     ALWAYS = "always"
     NEVER = "never"
 
@@ -61,6 +61,8 @@ class LearnOptions:
     cross-validation (paper: LAT)."""
     differences: Use = Use.AUTO
     """Whether the executed tree may test the difference of two features."""
+    sums: Use = Use.AUTO
+    """Whether the executed tree may test weighted sums of features."""
     units: Mapping[str, str] = field(default_factory=dict)
     """Units of features by their names: of different ones there is no difference."""
     max_depth: int | None = None
@@ -206,6 +208,7 @@ class LearnOptions:
             psa=Use.ALWAYS,
             history=History.LAST,
             differences=Use.NEVER,
+            sums=Use.NEVER,
             max_depth=5,
             ccp_alpha=0.0,
             root=Root.PARALLEL,
@@ -225,6 +228,7 @@ _ENUMS: Mapping[str, type[Enum]] = {
     "psa": Use,
     "history": History,
     "differences": Use,
+    "sums": Use,
     "root": Root,
     "upsample": Upsampling,
     "psa_choice": PsaChoice,

@@ -4,7 +4,8 @@ condition
     An atomic test of the state or of what was done before: `Threshold`, `Interval`, `IsTrue`,
     `HasCategory`, `PreviousActionIs` or `LastActionIs`.
 quantity
-    What a `Threshold` or an `Interval` compares: a numeric feature, or a `Difference` of two.
+    What a `Threshold` or an `Interval` compares: a numeric feature, or a `Combination` of several,
+    which is a `Difference` of two or a `WeightedSum`.
 literal
     A condition or its negation.
 
@@ -32,9 +33,56 @@ class Difference:
         if self.minuend == self.subtrahend:
             raise ValueError(f"the difference of {self.minuend!r} and itself is always 0")
 
+    @property
+    def terms(self) -> tuple[tuple[str, float], ...]:
+        """Its features with their weights."""
+        return (self.minuend, 1.0), (self.subtrahend, -1.0)
 
-#: A numeric feature by its name, or the difference of two.
-Quantity: TypeAlias = str | Difference
+
+@dataclass(frozen=True, slots=True)
+class WeightedSum:
+    """``angle + 0.4 × spin``, computed in double precision from left to right.
+
+    It is missing where any of its features is.
+    """
+
+    terms: tuple[tuple[str, float], ...]
+    """Features with their weights: two features at least, and weights that are not 0."""
+
+    def __post_init__(self) -> None:
+        names = tuple(name for name, _ in self.terms)
+        if len(names) < 2 or len(set(names)) < len(names):
+            raise ValueError(
+                f"a weighted sum is of two different features at least, not of {', '.join(names)}"
+            )
+        for name, weight in self.terms:
+            if not math.isfinite(weight) or not weight:
+                raise ValueError(f"the weight of {name!r} must be finite and not 0, not {weight}")
+        if tuple(weight for _, weight in self.terms) == (1.0, -1.0):
+            raise ValueError(f"{names[0]!r} less {names[1]!r} is a difference, no weighted sum")
+
+
+#: What is computed from several numeric features.
+Combination: TypeAlias = Difference | WeightedSum
+
+
+def combination(terms: tuple[tuple[str, float], ...]) -> Combination:
+    """What is computed from features with these weights.
+
+    >>> combination((("left", 1.0), ("right", -1.0)))
+    Difference(minuend='left', subtrahend='right')
+
+    Raises:
+        ValueError: There is no such combination.
+    """
+    match terms:
+        case ((minuend, 1.0), (subtrahend, -1.0)):
+            return Difference(minuend, subtrahend)
+    return WeightedSum(terms)
+
+
+#: A numeric feature by its name, or what is computed from several.
+Quantity: TypeAlias = str | Combination
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,22 +161,21 @@ Condition: TypeAlias = StateCondition | HistoryCondition
 
 
 def features_of(condition: StateCondition) -> tuple[str, ...]:
-    """The names of the features that a condition reads: one, or the two of a difference.
+    """The names of the features that a condition reads: one, or those of a combination.
 
     >>> features_of(Threshold(Difference("left", "right"), 0.0)), features_of(IsTrue("docked"))
     (('left', 'right'), ('docked',))
     """
     match condition:
-        case (
-            Threshold(quantity=Difference() as difference)
-            | Interval(quantity=Difference() as difference)
-        ):
-            return difference.minuend, difference.subtrahend
-        case Threshold(quantity=str(name)) | Interval(quantity=str(name)):
-            return (name,)
+        case Threshold(quantity=quantity) | Interval(quantity=quantity):
+            return features_in(quantity)
         case IsTrue(feature=name) | HasCategory(feature=name):
             return (name,)
-    raise AssertionError(condition)
+
+
+def features_in(quantity: Quantity) -> tuple[str, ...]:
+    """The names of the features that a quantity is computed from."""
+    return (quantity,) if isinstance(quantity, str) else tuple(name for name, _ in quantity.terms)
 
 
 @dataclass(frozen=True, slots=True)

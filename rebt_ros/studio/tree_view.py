@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Final, TypeAlias
 
@@ -12,7 +13,6 @@ from rebt_ros.behavior_tree.wording import Kind, Wording, heading, summary
 from rebt_ros.drawing.shapes import Line, Node
 from rebt_ros.drawing.tree_picture import drawn_tree
 from rebt_ros.logic.conditions import (
-    Difference,
     HasCategory,
     Interval,
     IsTrue,
@@ -24,6 +24,9 @@ from rebt_ros.logic.conditions import (
 
 #: What JSON can hold.
 Json: TypeAlias = Any
+
+#: What was shown of a feature that nothing is known of.
+_UNKNOWN: Final = Span(math.nan, math.nan)
 
 _PILLS: Final = frozenset({Kind.CONDITION, Kind.INVERTER})
 
@@ -133,14 +136,25 @@ def _meaning(node: nodes.Node, spans: Mapping[str, Span]) -> dict[str, Json]:
 
 
 def _quantity(quantity: Quantity, spans: Mapping[str, Span]) -> dict[str, Json]:
-    """A feature, or the two of a difference, with the range that was shown."""
-    if isinstance(quantity, Difference):
-        names = {"minuend": quantity.minuend, "subtrahend": quantity.subtrahend}
-        first, second = spans.get(quantity.minuend), spans.get(quantity.subtrahend)
-        span = first and second and Span(first.low - second.high, first.high - second.low)
-    else:
-        names, span = {"feature": quantity}, spans.get(quantity)
-    return {**names, "low": span.low if span else None, "high": span.high if span else None}
+    """A feature, or several with their weights, and between what numbers it was shown to lie."""
+    if isinstance(quantity, str):
+        span = spans.get(quantity)
+        return {
+            "feature": quantity,
+            "low": span.low if span else None,
+            "high": span.high if span else None,
+        }
+    low, high = 0.0, 0.0
+    for name, weight in quantity.terms:
+        span = spans.get(name, _UNKNOWN)
+        ends = weight * span.low, weight * span.high
+        low, high = low + min(ends), high + max(ends)
+    known = not math.isnan(low)
+    return {
+        "terms": [list(term) for term in quantity.terms],
+        "low": low if known else None,
+        "high": high if known else None,
+    }
 
 
 def _spans(learned: LearnedTree) -> dict[str, Span]:

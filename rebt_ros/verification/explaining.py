@@ -9,10 +9,11 @@ import numpy as np
 
 from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import LastActionIs, PreviousActionIs, features_of
+from rebt_ros.logic.conditions import LastActionIs, PreviousActionIs, features_in, features_of
 from rebt_ros.verification.acting import (
     Outcome,
     Step,
@@ -185,16 +186,13 @@ def _cells_of(
     grid: Grid, learned: LearnedTree, values: Sequence[float], history: ActionHistory
 ) -> list[int]:
     """The cell of a state in each field."""
-    by_name = dict(zip((feature.name for feature in learned.features), values, strict=True))
+    tests = StateTests(learned.features)
     cells = []
     for field in grid.fields:
         if field.quantity is None:
             cells.append(grid.cell_of(history))
-        elif isinstance(field.quantity, str):
-            cells.append(field.cell(by_name[field.quantity]))
         else:
-            minuend, subtrahend = field.quantity.minuend, field.quantity.subtrahend
-            cells.append(field.cell(by_name[minuend] - by_name[subtrahend]))
+            cells.append(field.cell(tests.reading(field.quantity)(values)))
     return cells
 
 
@@ -218,9 +216,7 @@ def _pinned(grid: Grid, boxes: Boxes, now: Sequence[int], fields: Sequence[int])
 
 
 def _concerns(field: Field, feature: str) -> bool:
-    if field.quantity is None or isinstance(field.quantity, str):
-        return field.quantity == feature
-    return feature in (field.quantity.minuend, field.quantity.subtrahend)
+    return field.quantity is not None and feature in features_in(field.quantity)
 
 
 def _flip(

@@ -27,6 +27,7 @@ from rebt_ros.behavior_tree.condition_tests import StateTests, holds_after
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import (
+    Combination,
     Condition,
     Difference,
     HasCategory,
@@ -39,6 +40,7 @@ from rebt_ros.logic.conditions import (
     Quantity,
     StateCondition,
     Threshold,
+    WeightedSum,
     features_of,
 )
 from rebt_ros.verification.errors import RuleError
@@ -153,7 +155,7 @@ class Grid:
             fields.append(Field(None, None, np.empty(0), cells, words))
             start = words.stop
         self.fields = tuple(fields)
-        """All fields: features and differences as they first occur, then what was done before."""
+        """All fields: features and combinations as they first occur, then what was done before."""
         self.words = start
         """Of a box."""
         self._of = {field.quantity: field for field in fields}
@@ -169,13 +171,17 @@ class Grid:
         return Field(quantity, feature, np.array(ends), (), words)
 
     def field(self, quantity: Quantity | None) -> Field | None:
-        """The field of a feature or a difference; of what was done before for None."""
+        """The field of a feature or a combination; of what was done before for None."""
         return self._of.get(quantity)
 
     @property
-    def differences(self) -> tuple[Field, ...]:
-        """The fields that are differences."""
-        return tuple(field for field in self.fields if isinstance(field.quantity, Difference))
+    def combinations(self) -> tuple[tuple[Field, Combination], ...]:
+        """The fields that are computed from several features."""
+        return tuple(
+            (field, field.quantity)
+            for field in self.fields
+            if isinstance(field.quantity, Difference | WeightedSum)
+        )
 
     def everything(self) -> Boxes:
         """One box with all cells."""
@@ -208,7 +214,7 @@ class Grid:
     def _holds(self, condition: StateCondition, ends: FloatArray) -> BoolArray:
         match condition:
             case Threshold(quantity=quantity) | Interval(quantity=quantity):
-                # A difference stands in the grid as one value.
+                # A combination stands in the grid as one value.
                 about_it = replace(condition, quantity=_QUANTITY.name)
                 return StateTests((_QUANTITY,)).of(about_it)(_signed(quantity, ends)[np.newaxis])
             case IsTrue(feature=name) | HasCategory(feature=name):

@@ -12,13 +12,17 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.logic.conditions import Difference, Quantity
+from rebt_ros.logic.conditions import Combination, Quantity, WeightedSum, features_in
 from rebt_ros.verification.grid import ANOTHER_ACTION, LARGEST, Boxes, Field, Grid, HistoryCell
+from rebt_ros.verification.linear_bounds import Bound, numbers_within
 from rebt_ros.verification.reference import Reference
 
-#: Most combinations of ranges of features and differences that are tried in a box.
+#: Most choices of ranges of features and combinations that are tried in a box.
 _MOST_COMBINATIONS: Final = 2_000
+#: ... where some are weighted sums, which take a linear program for each choice.
+_MOST_WEIGHED: Final = 20
 #: Most boxes of which it is tried to find a state.
 _MOST_TRIED: Final = 2_000
 #: How far inside of a range a value is chosen, as a share of all that was shown.
@@ -59,6 +63,11 @@ class _Range:
     def missing(self) -> bool:
         return math.isnan(self.at_most)
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Both ends, infinite where there is none."""
+        return self.above, self.at_most if self.at_most < LARGEST else math.inf
+
 
 class Unsettled(Exception):  # noqa: N818 - an answer rather than an error
     """Whether a box has a state could not be found out."""
@@ -92,12 +101,12 @@ def nearest(
 def possible_boxes(
     boxes: Boxes, grid: Grid, features: Sequence[Feature], shown: Reference
 ) -> tuple[Boxes, bool]:
-    """The boxes without those whose differences no numbers have.
+    """The boxes without those whose combinations of features no numbers have.
 
     Returns:
         The boxes, and whether it is known of all of them that there are such states.
     """
-    if not grid.differences or not boxes.shape[1]:
+    if not grid.combinations or not boxes.shape[1]:
         return boxes, True
     finder = StateFinder(grid, features, shown)
     kept = np.ones(boxes.shape[1], dtype=bool)
@@ -133,6 +142,7 @@ class StateFinder:
         self._features = features
         self._shown = shown
         self._place = {feature.name: place for place, feature in enumerate(features)}
+        self._tests = StateTests(features)
 
     @property
     def no_boxes(self) -> Boxes:
@@ -187,7 +197,7 @@ class StateFinder:
         return distances, rows
 
     def _distances(self, boxes: Boxes) -> FloatArray:
-        """How far boxes are from rows; differences of features do not count.
+        """How far boxes are from rows; combinations of features do not count.
 
         Returns:
             Shape (boxes, rows).
@@ -303,45 +313,45 @@ class StateFinder:
         return kind is not FeatureKind.CATEGORICAL or math.isnan(value) or value in field.ends
 
     def _fits(self, box: Boxes, values: Sequence[float]) -> bool:
-        for field in self._grid.differences:
+        for field, quantity in self._grid.combinations:
             cells = field.cells_of(box[:, np.newaxis])[0]
-            if not cells[field.cell(self._difference(field, values))]:
+            if not cells[field.cell(self._tests.reading(quantity)(values))]:
                 return False
         return True
 
-    def _difference(self, field: Field, values: Sequence[float]) -> float:
-        assert isinstance(field.quantity, Difference)
-        minuend = values[self._place[field.quantity.minuend]]
-        subtrahend = values[self._place[field.quantity.subtrahend]]
-        return minuend - subtrahend
-
     def _moved(self, box: Boxes, values: list[float]) -> list[float] | None:
-        """The values with some moved so that differences fit the box; None if that cannot be.
+        """The values with some moved so that combinations fit the box; None if that cannot be.
 
         Raises:
             Unsettled: It could not be found out.
         """
         restricted = [
-            (field, cells)
-            for field, cells in self._restricted(box)
-            if isinstance(field.quantity, Difference)
+            (quantity, field, cells)
+            for field, quantity in self._grid.combinations
+            if not (cells := field.cells_of(box[:, np.newaxis])[0]).all()
         ]
-        names = dict.fromkeys(name for field, _ in restricted for name in _names(field))
+        names = dict.fromkeys(
+            name for quantity, _, _ in restricted for name in features_in(quantity)
+        )
+        weighed = any(isinstance(quantity, WeightedSum) for quantity, _, _ in restricted)
+        solve = self._weighed if weighed else _solved
         choices = [
             _choices(self._grid.field(name), box)
             if self._movable in (None, name)
             else [_only(values[self._place[name]])]
             for name in names
         ]
-        choices += [_ranges(field, cells) for field, cells in restricted]
-        if math.prod(map(len, choices)) > _MOST_COMBINATIONS:
+        choices += [_ranges(field, cells) for _, field, cells in restricted]
+        if math.prod(map(len, choices)) > (_MOST_WEIGHED if weighed else _MOST_COMBINATIONS):
             raise Unsettled
         settled = True
         for chosen in product(*choices):
             ranges = dict(zip(names, chosen, strict=False))
             between = chosen[len(names) :]
-            fields = [field for field, _ in restricted]
-            solutions, possible = _solved(ranges, list(zip(fields, between, strict=True)))
+            wanted = [
+                (quantity, its) for (quantity, _, _), its in zip(restricted, between, strict=True)
+            ]
+            solutions, possible = solve(ranges, wanted)
             for found in solutions:
                 moved = list(values)
                 for name, value in found.items():
@@ -352,6 +362,25 @@ class StateFinder:
         if not settled:
             raise Unsettled
         return None
+
+    def _weighed(
+        self, ranges: dict[str, _Range], wanted: Sequence[tuple[Combination, _Range]]
+    ) -> tuple[list[dict[str, float]], bool]:
+        """As `_solved`, where there are weighted sums."""
+        known = [name for name, its in ranges.items() if not its.missing]
+        bounds: list[Bound] = []
+        for quantity, its in wanted:
+            if its.missing == all(name in known for name, _ in quantity.terms):
+                return [], False
+            if not its.missing:
+                weights = dict(quantity.terms)
+                bounds.append(Bound(tuple(weights.get(name, 0.0) for name in known), *its.ends))
+        scales = [float(self._shown.scale[self._place[name]]) for name in known]
+        found = numbers_within([ranges[name].ends for name in known], scales, bounds)
+        if found is None:
+            return [], False
+        missing = {name: math.nan for name, its in ranges.items() if its.missing}
+        return [missing | dict(zip(known, found, strict=True))], True
 
     def _in_cells(self, box: Boxes, values: Sequence[float], names: Iterable[str]) -> bool:
         for name in names:
@@ -364,7 +393,7 @@ class StateFinder:
 
 
 def _solved(
-    ranges: dict[str, _Range], differences: Sequence[tuple[Field, _Range]]
+    ranges: dict[str, _Range], differences: Sequence[tuple[Combination, _Range]]
 ) -> tuple[list[dict[str, float]], bool]:
     """Numbers that should lie in all ranges, and whether there can be any.
 
@@ -373,8 +402,8 @@ def _solved(
     known = {name: its for name, its in ranges.items() if not its.missing}
     exact: list[_Edge] = []
     loose: list[_Edge] = []
-    for field, its in differences:
-        minuend, subtrahend = _names(field)
+    for quantity, its in differences:
+        minuend, subtrahend = features_in(quantity)
         both = minuend in known and subtrahend in known
         if its.missing == both:
             return [], False
@@ -395,11 +424,6 @@ def _solved(
         missing | {name: float(value) for name, value in one.items()}
         for one in (amid, highest, lowest)
     ], True
-
-
-def _names(field: Field) -> tuple[str, str]:
-    assert isinstance(field.quantity, Difference)
-    return field.quantity.minuend, field.quantity.subtrahend
 
 
 def _choices(field: Field | None, box: Boxes) -> list[_Range]:

@@ -67,6 +67,8 @@ EVERY_NODE = nodes.Parallel(
         nodes.Condition(Literal(Interval("battery", 0.1, 0.7))),
         nodes.Condition(Literal(Threshold(some.DIFFERENCE, 0.1 + 0.2))),
         nodes.Condition(~Literal(Interval(some.DIFFERENCE, -0.1, 0.0))),
+        nodes.Condition(Literal(Threshold(some.SUM, 0.1 + 0.2))),
+        nodes.Condition(~Literal(Interval(some.SUM, -0.1, 0.0))),
         nodes.Condition(Literal(PreviousActionIs("go"))),
     )
 )
@@ -145,7 +147,7 @@ def test_what_is_dumped_is_loaded_again(learned: LearnedTree) -> None:
 @example(1.7976931348623157e308)
 @example(0.1 + 0.2)
 def test_thresholds_keep_every_bit(value: float) -> None:
-    for quantity in ("distance", some.DIFFERENCE):
+    for quantity in ("distance", some.DIFFERENCE, some.SUM):
         tree = nodes.Condition(Literal(Threshold(quantity, value)))
         loaded = loads(dumps(some.learned(tree))).tree
         assert isinstance(loaded, nodes.Condition)
@@ -204,6 +206,8 @@ EXTRA_RULES = (
     "cannot be",
     "does not have all categories",
     "and itself is always 0",
+    "the weight of",
+    "two different features",
 )
 
 
@@ -345,6 +349,26 @@ Change = Callable[[dict[str, Any]], object]
             "feature 'speed' is not declared",
         ),
         (
+            lambda d: d["tree"]["children"][9]["test"].update(minus="speed"),
+            "a test on 'distance' has either 'minus', or both 'weight' and 'plus', or none",
+        ),
+        (
+            lambda d: d["tree"]["children"][9]["test"].update(plus=[]),
+            "document.tree.children[9].test.plus must be an array of at least 1 elements, not []",
+        ),
+        (
+            lambda d: d["tree"]["children"][9]["test"].pop("plus"),
+            "a test on 'distance' has either 'minus', or both 'weight' and 'plus', or none",
+        ),
+        (
+            lambda d: d["tree"]["children"][9]["test"]["plus"][0].update(weight=0),
+            "the weight of 'battery' must be finite and not 0, not 0",
+        ),
+        (
+            lambda d: d["tree"]["children"][9]["test"]["plus"][0].update(feature="speed"),
+            "'speed'",
+        ),
+        (
             lambda d: d["tree"]["children"][7]["test"].update(minus=None),
             "document.tree.children[7].test.minus must be a text, not None.",
         ),
@@ -353,7 +377,7 @@ Change = Callable[[dict[str, Any]], object]
             "has the unknown field 'minus'",
         ),
         (
-            lambda d: d["tree"]["children"][8]["test"].update(action="fly"),
+            lambda d: d["tree"]["children"][10]["test"].update(action="fly"),
             "previous action 'fly' is not declared",
         ),
         (lambda d: d.pop("shown"), "document lacks 'shown'."),

@@ -106,12 +106,14 @@ def feasible_states(tree: DecisionTree, table: DemonstrationTable) -> Demonstrat
     distances, batteries = (
         [-1e30, math.nan, *beside(thresholds.get(name, set()))] for name in ("distance", "battery")
     )
-    # Where the difference is about at one of its thresholds, below all and above all.
+    # Where a combination is about at one of its thresholds, below all and above all.
     pairs = set(itertools.product(distances, batteries))
-    for apart in beside(thresholds.get(some.DIFFERENCE, set())):
-        for battery in (0.0, *batteries):
-            if math.isfinite(battery):
-                pairs |= {(value, battery) for value in beside({battery + apart})}
+    (_, far), (_, charged) = some.SUM.terms
+    for battery in (0.0, *filter(math.isfinite, batteries)):
+        for apart in beside(thresholds.get(some.DIFFERENCE, set())):
+            pairs |= {(value, battery) for value in beside({battery + apart})}
+        for weighed in beside(thresholds.get(some.SUM, set())):
+            pairs |= {(value, battery) for value in beside({(weighed - charged * battery) / far})}
     candidates = [
         [0.0, 1.0],
         [0.0, 1.0, 2.0, math.nan],
@@ -203,9 +205,9 @@ def every(table: DemonstrationTable, step: int) -> DemonstrationTable:
 
 
 VOCABULARIES = [
-    pytest.param(Vocabulary(history, differences), id=f"{history.value}, {len(differences)}")
+    pytest.param(Vocabulary(history, combinations), id=f"{history.value}, {len(combinations)}")
     for history in History
-    for differences in ((), (some.DIFFERENCE,))
+    for combinations in ((), (some.DIFFERENCE, some.SUM))
 ]
 
 

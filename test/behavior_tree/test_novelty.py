@@ -28,13 +28,15 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.learning.options import LearnOptions
 from rebt_ros.learning.pipeline import learn_from
-from rebt_ros.logic.conditions import Difference
+from rebt_ros.logic.conditions import Difference, WeightedSum
 
 X, Y = Feature("x", topic="state", index=0), Feature("y", topic="state", index=1)
 KIND = Feature("kind", FeatureKind.CATEGORICAL, ("3", "7"), topic="state", index=2)
 FEATURES = (X, Y, KIND)
 VOCABULARIES = st.builds(
-    Vocabulary, st.sampled_from(History), st.sampled_from(((), (Difference("x", "y"),)))
+    Vocabulary,
+    st.sampled_from(History),
+    st.sampled_from(((), (Difference("x", "y"), WeightedSum((("x", 2.0), ("y", -0.5)))))),
 )
 NEAR = ShownLeaf(5, (Span(0.0, 1.0), Span(5.0, 5.0), ("3",)))
 FAR = ShownLeaf(5, (Span(3.0, 4.0), Span(5.0, 6.0), ("3", "7")))

@@ -22,6 +22,7 @@ from rebt_ros.logic.conditions import (
     Literal,
     PreviousActionIs,
     Threshold,
+    WeightedSum,
 )
 
 #: Names that are easily taken for something else, so that hypothesis meets collisions quickly.
@@ -94,7 +95,17 @@ numbers = st.one_of(
 differences = st.lists(names, min_size=2, max_size=2, unique=True).map(
     lambda pair: Difference(*pair)
 )
-quantities = st.one_of(names, differences)
+weights = numbers.filter(lambda weight: weight not in (0.0, 1.0)) | st.just(1.0)
+sums = st.lists(names, min_size=2, max_size=3, unique=True).flatmap(
+    lambda its: st.builds(
+        lambda first, others: WeightedSum(tuple(zip(its, (first, *others), strict=True))),
+        weights,
+        st.lists(weights, min_size=len(its) - 1, max_size=len(its) - 1).filter(
+            lambda others: others != [-1.0]
+        ),
+    )
+)
+quantities = st.one_of(names, differences, sums)
 conditions: st.SearchStrategy[Condition] = st.one_of(
     st.builds(Threshold, quantities, numbers),
     st.builds(
@@ -111,6 +122,8 @@ conditions: st.SearchStrategy[Condition] = st.one_of(
 
 #: Of two sensors.
 APART = Difference("left", "right")
+#: As someone balances.
+WEIGHED = WeightedSum((("angle", 1.0), ("spin", -0.4), ("x", 1e-5)))
 
 
 def wording_of(*shown: Condition) -> Wording:
@@ -133,6 +146,10 @@ def text(condition: Condition, *others: Condition, positive: bool = True) -> str
         (Threshold("ticks", 1234.5678), "ticks ≤ 1235", "ticks > 1235"),
         (Threshold("charge", 0.00001234567), "charge ≤ 1.23e-5", None),
         (Threshold("x", KNOWN), "x is known", "x is missing"),
+        (Threshold(WEIGHED, 0.02), "angle − 0.4 × spin + 1e-05 × x ≤ 0.02", None),
+        (Threshold(WEIGHED, 0.0), "angle − 0.4 × spin + 1e-05 × x ≤ 0", None),
+        (Threshold(WEIGHED, KNOWN), "angle − 0.4 × spin + 1e-05 × x is known", None),
+        (Threshold(WeightedSum((("x", -2.0), ("y", 10.0))), 1.0), "−2 × x + 10 × y ≤ 1", None),
         (Interval("x", 0.30000001192092896, 2.0), "0.3 < x ≤ 2", "not (0.3 < x ≤ 2)"),
         (IsTrue("docked"), "docked", "not docked"),
         (IsTrue("nothing_near"), "nothing_near", "not nothing_near"),
@@ -167,6 +184,9 @@ def test_a_condition_reads_as_a_person_writes_it(
         (HasCategory("kind", "box "), "kind = 'box '"),
         (HasCategory("kind", "it's\n"), "kind = 'it\\'s\\n'"),
         (Threshold("12", 0.5), "'12' ≤ 0.5"),
+        (Threshold("2 × x", 0.5), "'2 × x' ≤ 0.5"),
+        (Threshold("x + y", 0.5), "'x + y' ≤ 0.5"),
+        (Threshold(WeightedSum((("−x", 1.0), ("3", -2.0))), 0.5), "'−x' − 2 × '3' ≤ 0.5"),
         (Interval("12", 0.3, 0.5), "0.3 < '12' ≤ 0.5"),
         (IsTrue("0.3 < x ≤ 0.5"), "'0.3 < x ≤ 0.5'"),
         (IsTrue("doing go"), "'doing go'"),

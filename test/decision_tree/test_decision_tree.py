@@ -136,7 +136,7 @@ def test_columns_and_their_values() -> None:
     assert (encode(table, FEATURES_ALONE) == encode(table, some.LAT)[:, :6]).all()
 
 
-def test_differences_and_the_previous_action_have_columns_of_their_own() -> None:
+def test_combinations_and_the_previous_action_have_columns_of_their_own() -> None:
     table = some.table(
         [(0.5, 0.25, 1, 2), (math.nan, 1e38, 0, 0), (1e38, -1e38, 0, 0), (0.3, 0.1, 0, 1)],
         [0, 2, 2, 3],
@@ -146,20 +146,23 @@ def test_differences_and_the_previous_action_have_columns_of_their_own() -> None
     assert asked[:6] == columns(table, FEATURES_ALONE)
     assert asked[6:] == (
         Number(some.DIFFERENCE),
+        Number(some.SUM),
         *(Indicator(PreviousActionIs(one)) for one in some.LABELS),
     )
     matrix = encode(table, some.EVERYTHING)
     assert (matrix[:, :6] == encode(table, FEATURES_ALONE)).all()
     missing = np.finfo(np.float32).max
-    # The difference is computed in double precision and rounded once.
+    # Combinations are computed in double precision and rounded once; all are known, so none comes
+    # near to what stands for missing ones.
+    far = 0.3 * float(missing)
     assert np.array_equal(
         matrix[:, 6:],
         np.array(
             [
-                [0.25, 0, 0, 0, 0],
-                [missing, 1, 0, 0, 0],
-                [np.float32(2e38), 0, 0, 1, 0],
-                [np.float32(0.3 - 0.1), 0, 0, 0, 0],
+                [0.25, -0.7 * 0.5 + 1.3 * 0.25, 0, 0, 0, 0],
+                [missing, missing, 1, 0, 0, 0],
+                [far, -far, 0, 0, 1, 0],
+                [0.3 - 0.1, -0.7 * 0.3 + 1.3 * 0.1, 0, 0, 0, 0],
             ],
             dtype=np.float32,
         ),

@@ -35,6 +35,7 @@ from rebt_ros.logic.conditions import (
     Literal,
     PreviousActionIs,
     Threshold,
+    WeightedSum,
 )
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -103,6 +104,9 @@ labels = st.one_of(st.sampled_from(HOSTILE), st.text(max_size=8))
 quantities = st.one_of(
     labels,
     st.lists(labels, min_size=2, max_size=2, unique=True).map(lambda pair: Difference(*pair)),
+    st.lists(labels, min_size=2, max_size=3, unique=True).map(
+        lambda its: WeightedSum(tuple((name, 0.1 + place) for place, name in enumerate(its)))
+    ),
 )
 leaves = st.one_of(
     labels.map(act),

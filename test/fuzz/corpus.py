@@ -62,6 +62,7 @@ def _everything() -> LearnedTree:
             nodes.Condition(~Literal(PreviousActionIs("go"))),
             nodes.Condition(some.at_most(some.DIFFERENCE, 0.0)),
             nodes.Condition(Literal(Interval(some.DIFFERENCE, -0.1, 1e300))),
+            nodes.Condition(Literal(Interval(some.SUM, -0.1, 1e300))),
         )
     )
     psa = Suggestion("psa-1", SuggestionKind.PSA, 3, tree.children[3], attached=True)

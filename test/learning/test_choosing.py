@@ -28,7 +28,7 @@ from rebt_ros.learning.conversion import convert, own_history_choices
 from rebt_ros.learning.cross_validation import CrossValidation, folds
 from rebt_ros.learning.judged_levels import JudgedLevels, clearly_raised
 from rebt_ros.learning.options import LearnOptions, Use
-from rebt_ros.logic.conditions import Difference
+from rebt_ros.logic.conditions import Difference, WeightedSum
 
 
 def table(
@@ -535,7 +535,7 @@ def diagonal(rows: int = 400) -> DemonstrationTable:
 @pytest.mark.parametrize("use", [Use.AUTO, Use.ALWAYS])
 def test_a_difference_that_makes_a_much_smaller_tree_is_tested(use: Use) -> None:
     policy = choose(diagonal(), LearnOptions(differences=use))
-    assert policy.fitted.vocabulary.differences == (Difference("left", "right"),)
+    assert policy.fitted.vocabulary.combinations == (Difference("left", "right"),)
     tree = policy.fitted.at(policy.ccp_alpha).tree
     assert tree.leaves <= 4
     said = any("make a smaller tree" in reason for reason in policy.reasons)
@@ -543,8 +543,33 @@ def test_a_difference_that_makes_a_much_smaller_tree_is_tested(use: Use) -> None
 
 
 def test_differences_are_not_tested_where_that_is_not_wanted() -> None:
-    policy = choose(diagonal(), LearnOptions(differences=Use.NEVER))
-    assert policy.fitted.vocabulary.differences == ()
+    policy = choose(diagonal(), LearnOptions(differences=Use.NEVER, sums=Use.NEVER))
+    assert policy.fitted.vocabulary.combinations == ()
+
+
+def slanted(rows: int = 400) -> DemonstrationTable:
+    """Turns where the left side is less than half as far away as the right one."""
+    plain = diagonal(rows)
+    turns = plain.states[:, 0] < 0.5 * plain.states[:, 1]
+    turn, go = plain.actions.index("turn"), plain.actions.index("go")
+    return replace(plain, chosen=np.where(turns, turn, go))
+
+
+@pytest.mark.parametrize("use", [Use.AUTO, Use.ALWAYS])
+def test_a_weighted_sum_that_makes_a_simpler_tree_is_tested(use: Use) -> None:
+    policy = choose(slanted(), LearnOptions(sums=use))
+    (line,) = policy.fitted.vocabulary.combinations
+    assert isinstance(line, WeightedSum)
+    weights = dict(line.terms)
+    assert weights["left"] / weights["right"] == pytest.approx(-2, rel=0.1)
+    assert policy.fitted.at(policy.ccp_alpha).tree.leaves <= 6
+    said = any("Weighted sums of features make a simpler tree" in one for one in policy.reasons)
+    assert said is (use is Use.AUTO)
+
+
+def test_weighted_sums_are_not_tested_where_that_is_not_wanted() -> None:
+    policy = choose(slanted(), LearnOptions(sums=Use.NEVER))
+    assert not any(isinstance(one, WeightedSum) for one in policy.fitted.vocabulary.combinations)
 
 
 def test_a_difference_that_makes_no_smaller_tree_is_not_tested() -> None:
@@ -555,7 +580,7 @@ def test_a_difference_that_makes_no_smaller_tree_is_not_tested() -> None:
     plain = table(sides[:, 0].tolist(), labels, [row // 80 for row in range(400)])
     rows = replace(plain, features=(Feature("left"), Feature("right")), states=sides)
     policy = choose(rows, LearnOptions())
-    assert policy.fitted.vocabulary.differences == ()
+    assert policy.fitted.vocabulary.combinations == ()
     assert any("Differences of features make no better tree" in one for one in policy.reasons)
 
 

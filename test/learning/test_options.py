@@ -118,7 +118,8 @@ def test_the_papers_settings_are_those_of_the_paper() -> None:
     assert (PAPER.delta, PAPER.max_depth, PAPER.ccp_alpha) == (0.3, 5, 0.0)
     assert (PAPER.psa, PAPER.history) == (Use.ALWAYS, rebt_ros.History.LAST)
     assert (PAPER.root, PAPER.reductions) == (rebt_ros.Root.PARALLEL, None)
-    assert (PAPER.differences, PAPER.reaction_time) == (Use.NEVER, 0.0)
+    assert (PAPER.differences, PAPER.sums) == (Use.NEVER, Use.NEVER)
+    assert PAPER.reaction_time == 0.0
     assert not any((PAPER.refit, PAPER.simplest, PAPER.readable_thresholds, PAPER.routines))
     assert PAPER.is_paper
     assert not LearnOptions().is_paper

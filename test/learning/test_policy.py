@@ -32,6 +32,7 @@ from rebt_ros.logic.conditions import (
     Literal,
     PreviousActionIs,
     Threshold,
+    WeightedSum,
 )
 from rebt_ros.storage.tree_file import write_tree
 
@@ -50,6 +51,8 @@ numeric = st.sampled_from(
         "battery[t-2]",
         some.DIFFERENCE,
         Difference("distance", "distance[t-1]"),
+        some.SUM,
+        WeightedSum((("distance", 2.5), ("distance[t-1]", -2.5), ("battery[t-2]", 0.1))),
     )
 )
 conditions: st.SearchStrategy[Condition] = st.one_of(

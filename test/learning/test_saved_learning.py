@@ -267,8 +267,8 @@ def test_what_is_no_such_file_is_refused_in_one_sentence(how: str, tmp_path: Pat
 def test_another_version_is_refused() -> None:
     kept = saved(learned())
     assert kept is not None
-    with pytest.raises(InputError, match="of version 2, where 1 is read: learn again"):
-        restored(Saved(kept.words | {"version": 2}, kept.arrays))
+    with pytest.raises(InputError, match="of version 1, where 2 is read: learn again"):
+        restored(Saved(kept.words | {"version": 1}, kept.arrays))
 
 
 @settings(max_examples=60)

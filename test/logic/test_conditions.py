@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 import strategies as some
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.logic.conditions import (
     KNOWN,
+    Combination,
     Difference,
     HasCategory,
     Interval,
@@ -20,6 +22,8 @@ from rebt_ros.logic.conditions import (
     Literal,
     PreviousActionIs,
     Threshold,
+    WeightedSum,
+    combination,
     deciding,
     features_of,
 )
@@ -57,11 +61,34 @@ def test_a_difference_is_of_two_features() -> None:
 
 
 @pytest.mark.parametrize(
+    ("terms", "why"),
+    [
+        ((("x", 2.0),), "of two different features at least, not of x"),
+        ((("x", 2.0), ("x", 1.0)), "of two different features at least, not of x, x"),
+        ((("x", 2.0), ("y", 0.0)), "the weight of 'y' must be finite and not 0, not 0.0"),
+        ((("x", math.inf), ("y", 1.0)), "the weight of 'x' must be finite and not 0, not inf"),
+        ((("x", 1.0), ("y", -1.0)), "'x' less 'y' is a difference, no weighted sum"),
+    ],
+)
+def test_a_weighted_sum_that_is_none_is_refused(
+    terms: tuple[tuple[str, float], ...], why: str
+) -> None:
+    with pytest.raises(ValueError, match=re.escape(why)):
+        WeightedSum(terms)
+
+
+@pytest.mark.parametrize("one", [some.DIFFERENCE, some.SUM])
+def test_a_combination_is_made_of_its_terms(one: Combination) -> None:
+    assert combination(one.terms) == one
+
+
+@pytest.mark.parametrize(
     ("condition", "features"),
     [
         (Threshold("distance", 0.3), ("distance",)),
         (Interval("distance", 0.1, 0.3), ("distance",)),
         (Threshold(some.DIFFERENCE, 0.3), ("distance", "battery")),
+        (Threshold(some.SUM, 0.3), ("distance", "battery")),
         (Interval(some.DIFFERENCE, 0.1, 0.3), ("distance", "battery")),
         (IsTrue("docked"), ("docked",)),
         (HasCategory("kind", "cup"), ("kind",)),

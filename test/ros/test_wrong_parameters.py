@@ -46,7 +46,7 @@ WRONG: Mapping[type, tuple[str, ...]] = {
 #: Texts that must be one of a few words.
 CHOICES = {
     *("differences", "history", "novelty", "pair_by", "psa", "publish", "root", "state_qos"),
-    *("tick_on", "upsample"),
+    *("sums", "tick_on", "upsample"),
 }
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.runtime import executable
-from rebt_ros.logic.conditions import Difference
+from rebt_ros.logic.conditions import Difference, WeightedSum
 from rebt_ros.verification.comparing import compare
 from rebt_ros.verification.grid import Boxes, Grid
 
@@ -27,6 +27,8 @@ def _boxes_with(boxes: Boxes, grid: Grid, states: written.Everything, row: int) 
                 cell = grid.cell_of(states.histories[states.history[row]])
             case Difference(minuend=minuend, subtrahend=subtrahend):
                 cell = field.cell(state[minuend] - state[subtrahend])
+            case WeightedSum(terms=((one, weight), (other, its))):
+                cell = field.cell(weight * state[one] + its * state[other])
             case name:
                 cell = field.cell(state[name])
         inside &= field.cells_of(boxes)[:, cell]

@@ -17,7 +17,6 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.logic.conditions import (
-    Difference,
     Interval,
     Threshold,
 )
@@ -34,7 +33,7 @@ RULES_PER_TREE = 10
 def _compares(tree: nodes.Node) -> bool:
     return any(
         isinstance(one.literal.condition, Threshold | Interval)
-        and isinstance(one.literal.condition.quantity, Difference)
+        and not isinstance(one.literal.condition.quantity, str)
         for one in nodes.conditions(tree)
     )
 

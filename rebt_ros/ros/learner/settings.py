@@ -250,6 +250,14 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
             choices=_USES,
             fixed=False,
         ),
+        "sums": declare.text(
+            "sums",
+            "auto",
+            "Whether the tree may weigh features against each other, as in "
+            "angle + 0.4 × spin > 0.02; auto: where that takes less to describe what was shown.",
+            choices=_USES,
+            fixed=False,
+        ),
         "units": lambda: _units(units()),
         "simplest": declare.flag(
             "simplest",

@@ -3,6 +3,7 @@
 import { button, byId, element, keyed, setAttribute, setText, show } from "./dom.js";
 import { Editor } from "./editor.js";
 import { changedWords } from "./learn.js";
+import { features } from "./margins.js";
 import { Tree, treeTools } from "./tree.js";
 import { shortName } from "./why.js";
 import { clock, count, sentence } from "./words.js";
@@ -168,9 +169,9 @@ export class Curate {
 
   names() {
     const { view } = this.state.get("draft");
-    const features = view.nodes.flatMap((node) => [node.feature, node.minuend, node.subtrahend]);
+    const named = view.nodes.flatMap(features);
     const labels = new Set(Object.keys(this.state.get("actions")));
-    const all = [...labels, ...features.filter((one) => one !== undefined && !labels.has(one))];
+    const all = [...labels, ...named.filter((one) => !labels.has(one))];
     keyed(
       byId("names"),
       [...new Set(all)].sort().map((name) => [name, labels.has(name)]),

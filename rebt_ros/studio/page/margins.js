@@ -4,14 +4,22 @@ import { number, yesNo } from "./words.js";
 
 /** Whether the node is a condition on a number, which has thresholds. */
 export function isNumeric(node) {
-  return node.above !== undefined && (node.feature !== undefined || node.minuend !== undefined);
+  return node.above !== undefined && features(node).length > 0;
+}
+
+/** The names of the features that the condition reads. */
+export function features(node) {
+  if (node.terms !== undefined) return node.terms.map(([name]) => name);
+  return node.feature === undefined ? [] : [node.feature];
 }
 
 /** What the condition reads; null where it is not known. */
 export function read(node, values) {
-  if (node.minuend !== undefined) {
-    const [minuend, subtrahend] = [values[node.minuend], values[node.subtrahend]];
-    return typeof minuend === "number" && typeof subtrahend === "number" ? minuend - subtrahend : null;
+  if (node.terms !== undefined) {
+    const products = node.terms.map(([name, weight]) =>
+      typeof values[name] === "number" ? weight * values[name] : null,
+    );
+    return products.includes(null) ? null : products.reduce((total, product) => total + product);
   }
   const value = node.feature === undefined ? null : values[node.feature];
   return value ?? null;

@@ -2,7 +2,7 @@
 
 import { element, setAttribute, setText, svg } from "./dom.js";
 import { arrange } from "./layout.js";
-import { holding, isNumeric, range, read, readText, share } from "./margins.js";
+import { features, holding, isNumeric, range, read, readText, share } from "./margins.js";
 import { statusWords } from "./words.js";
 
 const METER = 22;
@@ -249,8 +249,8 @@ export class Tree {
     const { shown } = this.options;
     if (node.label !== undefined) return shown(node.label);
     let words = node.text;
-    for (const feature of [node.feature, node.minuend, node.subtrahend]) {
-      if (feature !== undefined && shown(feature) !== feature) words = words.replace(feature, shown(feature));
+    for (const feature of features(node)) {
+      if (shown(feature) !== feature) words = words.replace(feature, shown(feature));
     }
     return words;
   }
@@ -450,7 +450,7 @@ export function calm() {
 
 /** Whether there is something to show below a node while it runs. */
 function isMetered(node) {
-  return node.kind === "condition" && (node.feature !== undefined || node.minuend !== undefined);
+  return node.kind === "condition" && features(node).length > 0;
 }
 
 /** Buttons for a tree: find, jump, fold and zoom. */

@@ -1,0 +1,259 @@
+"""Which weighted sums of features a tree may test: ``angle + 0.4 × spin > 0.02``.
+
+Whoever weighs one measurement against another, as in braking by distance and speed or in balancing,
+draws a slanted line through the states.  A tree that compares one feature at a time follows it in
+steps, with many splits that many rows are needed for.  So lines are looked for in the parts of a
+tree that have many leaves.  Each parts two actions, by as few features as pay for themselves, and
+is offered where the whole description of the rows gets shorter by it (see `description_length`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.decision_tree.description_length import shortest_description
+from rebt_ros.decision_tree.encoding import Number
+from rebt_ros.decision_tree.fitted import FittedTree
+from rebt_ros.decision_tree.training import FitOptions, fit
+from rebt_ros.demonstration.builder import LARGEST_VALUE
+from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import WeightedSum
+
+#: How many sums are offered, and how many are tried for each.
+_MOST_SUMS, _MOST_TRIED = 4, 5
+#: Fewer different values than that are counts, or places of a grid, which nobody weighs.
+_LEAST_VALUES = 20
+#: Sums are made of so many features, the first ones.
+_MOST_FEATURES = 24
+#: In how many parts of a tree lines are looked for, and how many leaves a part has.
+_MOST_PARTS, _LEAST_LEAVES = 4, 4
+#: Lines part the most frequent actions of a part: so many, with so many rows.
+_MOST_ACTIONS, _LEAST_ROWS = 4, 8
+#: Of more rows of an action, so many tell enough.
+_MOST_ROWS = 500
+#: Significant digits of a weight, and the bits of one, which has a sign.
+_DIGITS = 2
+_WEIGHT_BITS = 1 + math.log2(9 * 10 ** (_DIGITS - 1))
+#: How large weights of states that are scaled to their spread may be: a variance, as of a prior.
+_LOOSE = 100.0
+#: Steps of Newton's method, of which a dozen do, and when there is no more to gain.
+_MOST_STEPS, _CLOSE = 30, 1e-6
+
+
+def likely_sums(
+    table: DemonstrationTable, fitted: FittedTree, options: FitOptions
+) -> tuple[WeightedSum, ...]:
+    """The sums with which a tree describes the rows in the fewest bits.
+
+    Args:
+        table: What the tree was fitted to.
+        fitted: By what else there is to test.
+        options: How it was fitted.
+
+    Returns:
+        At most four; none where they do not make the description shorter.
+    """
+    measured = _measured(table)
+    if len(measured) < 2:
+        return ()
+    describing = _Describing(table, options, len(measured))
+    best = _Described(fitted, (), shortest_description(fitted).bits)
+    while len(best.sums) < _MOST_SUMS:
+        found = [
+            one
+            for one in dict.fromkeys(_lines(table, best.fitted, measured))
+            if one not in best.sums
+        ]
+        tried = [describing.by((*best.sums, one)) for one in describing.likely(best.sums, found)]
+        shortest = min(tried, key=lambda one: one.bits, default=best)
+        if shortest.bits >= best.bits:
+            break
+        best = shortest
+    return best.sums
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Described:
+    """A tree that may test some sums."""
+
+    fitted: FittedTree
+    sums: tuple[WeightedSum, ...]
+    bits: float
+    """What it takes to describe the rows by it, and to say what its sums are."""
+
+
+class _Describing:
+    """Describes the rows of a table by trees.
+
+    Args:
+        table: What is described.
+        options: How trees are fitted.
+        features: How many features a sum can be of.
+    """
+
+    def __init__(self, table: DemonstrationTable, options: FitOptions, features: int) -> None:
+        self._table, self._options = table, options
+        self._term_bits = _term_bits(features)
+
+    def by(self, sums: tuple[WeightedSum, ...]) -> _Described:
+        """By the tree that may test some sums."""
+        fitted = self._fitted(sums)
+        stating = self._term_bits * sum(len(one.terms) for one in sums)
+        return _Described(fitted, sums, shortest_description(fitted).bits + stating)
+
+    def likely(
+        self, sums: tuple[WeightedSum, ...], found: Sequence[WeightedSum]
+    ) -> Sequence[WeightedSum]:
+        """Those of some further sums that a tree with all of them makes most use of."""
+        if len(found) <= _MOST_TRIED:
+            return found
+        fitted = self._fitted((*sums, *found))
+        gains = dict(zip(fitted.asked, fitted.gains.tolist(), strict=True))
+        return sorted(found, key=lambda one: -gains[Number(one)])[:_MOST_TRIED]
+
+    def _fitted(self, sums: tuple[WeightedSum, ...]) -> FittedTree:
+        vocabulary = self._options.vocabulary.with_more(sums)
+        return fit(self._table, replace(self._options, vocabulary=vocabulary))
+
+
+def _term_bits(features: int) -> float:
+    """What it takes to state a feature and its weight."""
+    return math.log2(features) + _WEIGHT_BITS
+
+
+def _measured(table: DemonstrationTable) -> list[int]:
+    """The places of the features that can be weighed."""
+    places: list[int] = []
+    for place, feature in enumerate(table.features):
+        if feature.kind is FeatureKind.NUMERIC and not feature.lag and len(places) < _MOST_FEATURES:
+            column = table.states[:, place]
+            if len(np.unique(column[~np.isnan(column)])) >= _LEAST_VALUES:
+                places.append(place)
+    return places
+
+
+def _lines(
+    table: DemonstrationTable, fitted: FittedTree, measured: Sequence[int]
+) -> Iterator[WeightedSum]:
+    """Sums that part two actions in some part of a tree."""
+    states = table.states[:, measured]
+    names = [table.features[place].name for place in measured]
+    known = ~np.isnan(states).any(axis=1)
+    for part in _parts(table, fitted):
+        rows = np.flatnonzero(part & known)
+        chosen = table.chosen[rows]
+        counts = np.bincount(chosen, minlength=len(table.actions))
+        frequent = np.argsort(-counts, kind="stable")[:_MOST_ACTIONS]
+        for pair in combinations(frequent[counts[frequent] >= _LEAST_ROWS].tolist(), 2):
+            first, second = (_some(rows[chosen == action]) for action in pair)
+            is_second = np.repeat([False, True], [len(first), len(second)])
+            line = _line(states[np.concatenate([first, second])], is_second, names)
+            if line is not None:
+                yield line
+
+
+def _parts(table: DemonstrationTable, fitted: FittedTree) -> Iterator[BoolArray]:
+    """Which rows reach the parts of a tree that have the most leaves, shape (rows,) each."""
+    standing, parents = fitted.standing_explained, fitted.path.parents
+    leaves = np.zeros(len(parents), dtype=np.int64)
+    leaves[np.unique(standing[fitted.grown.left < 0])] = 1
+    # Parents come before their children.
+    for node in range(len(parents) - 1, 0, -1):
+        leaves[parents[node]] += leaves[node]
+    reached = standing[fitted.reached(table)]
+    largest = np.argsort(-leaves, kind="stable")[:_MOST_PARTS]
+    for top in largest[leaves[largest] >= _LEAST_LEAVES].tolist():
+        below = np.zeros(len(parents), dtype=bool)
+        below[top] = True
+        for node in range(top + 1, len(parents)):
+            below[node] = below[parents[node]]
+        yield below[reached]
+
+
+def _some(rows: IntArray) -> IntArray:
+    """The rows, or as many of them, evenly spread, as tell enough."""
+    return rows[:: -(-len(rows) // _MOST_ROWS)]
+
+
+def _line(states: FloatArray, is_second: BoolArray, names: Sequence[str]) -> WeightedSum | None:
+    """The sum that tells two actions apart in the fewest bits; None where one feature does.
+
+    Features are left out one by one, always the one that matters least.
+    """
+    low, high = np.percentile(states, (5, 95), axis=0)
+    spread = np.where(high > low, high - low, np.ptp(states, axis=0))
+    use = np.flatnonzero(spread > 0)
+    scaled = (states - np.median(states, axis=0)) / np.where(spread > 0, spread, 1.0)
+    exception_bits, term_bits = math.log2(len(states)), _term_bits(max(len(use), 1))
+    least, best = math.inf, np.zeros(len(names))
+    while len(use):
+        weights = np.zeros(len(names))
+        *weights[use], offset = _logistic_regression(scaled[:, use], is_second)
+        exceptions = np.count_nonzero((scaled @ weights + offset > 0) != is_second)
+        bits = exceptions * exception_bits + len(use) * term_bits
+        if bits <= least:
+            least, best = bits, weights
+        use = np.delete(use, np.argmin(np.abs(weights[use])))
+    if np.count_nonzero(best) < 2:
+        return None
+    return _as_sum(best, np.where(spread > 0, spread, 1.0), np.abs(states).max(axis=0), names)
+
+
+def _as_sum(
+    scaled: FloatArray, spread: FloatArray, largest: FloatArray, names: Sequence[str]
+) -> WeightedSum | None:
+    """The sum of the features themselves, the one that matters most first, with a weight of 1."""
+    order = [place for place in np.argsort(-np.abs(scaled), kind="stable") if scaled[place]]
+    own = scaled / spread
+    weights = [float(f"{own[place] / own[order[0]]:.{_DIGITS}g}") for place in order]
+    reach = sum(abs(weight) * largest[place] for weight, place in zip(weights, order, strict=True))
+    if not all(weights) or not reach <= LARGEST_VALUE or weights == [1.0, -1.0]:
+        return None
+    return WeightedSum(
+        tuple((names[place], weight) for place, weight in zip(order, weights, strict=True))
+    )
+
+
+def _logistic_regression(scaled: FloatArray, is_second: BoolArray) -> FloatArray:
+    """A line between two actions that count alike, however many rows they have.
+
+    By Newton's method, halving steps that go too far.  On so few rows scikit-learn's solver takes
+    many times as long, most of it before it begins.
+
+    Args:
+        scaled: Shape (rows, features).
+        is_second: Shape (rows,).
+
+    Returns:
+        Weights of the features and, behind them, the offset, shape (features + 1,).
+    """
+    matrix = np.column_stack([scaled, np.ones(len(scaled))])
+    sign = np.where(is_second, 1.0, -1.0)
+    share = np.where(is_second, 0.5 / is_second.sum(), 0.5 / (~is_second).sum()) * len(scaled)
+    ridge = np.full(matrix.shape[1], 1 / _LOOSE)
+    ridge[-1] = 1e-9
+
+    def loss(solution: FloatArray) -> float:
+        likelihood = share @ np.logaddexp(0.0, -sign * (matrix @ solution))
+        return float(likelihood + ridge @ solution**2 / 2)
+
+    solution = np.zeros(matrix.shape[1])
+    least = loss(solution)
+    for _ in range(_MOST_STEPS):
+        wrong = 1 / (1 + np.exp(np.clip(sign * (matrix @ solution), -500.0, 500.0)))
+        gradient = ridge * solution - matrix.T @ (share * sign * wrong)
+        curved = matrix * (share * wrong * (1 - wrong))[:, np.newaxis]
+        step = np.linalg.solve(np.diag(ridge) + matrix.T @ curved, gradient)
+        while (now := loss(solution - step)) > least and np.abs(step).max() > _CLOSE:
+            step = step / 2
+        if least - now <= _CLOSE * least:
+            break
+        solution, least = solution - step, now
+    return solution

@@ -1,0 +1,132 @@
+"""Tests of the weighted sums that a tree may test."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import strategies as some
+from hypothesis import given, settings
+
+from rebt_ros.arrays import FloatArray
+from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
+from rebt_ros.decision_tree.training import FitOptions, fit
+from rebt_ros.decision_tree.weighted_sums import likely_sums
+from rebt_ros.demonstration.schema import Feature, FeatureKind
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import WeightedSum
+
+NAMES = ("gap", "speed", "noise")
+
+
+def shown(
+    states: FloatArray,
+    chosen: FloatArray,
+    features: tuple[Feature, ...] = tuple(map(Feature, NAMES)),
+) -> DemonstrationTable:
+    return some.table(
+        [tuple(row) for row in states.tolist()],
+        [int(one) for one in chosen],
+        features=features,
+    )
+
+
+def drawn(rows: int = 400, seed: int = 1) -> FloatArray:
+    """Of three features that are scaled differently, shape (rows, 3)."""
+    return np.random.default_rng(seed).uniform(-1, 1, (rows, 3)) * (1.0, 10.0, 1.0)
+
+
+def found(table: DemonstrationTable) -> tuple[WeightedSum, ...]:
+    options = FitOptions(FEATURES_ALONE)
+    return likely_sums(table, fit(table, options), options)
+
+
+def braking(states: FloatArray) -> FloatArray:
+    """Brakes where the gap is too small for the speed."""
+    return states[:, 0] - 0.08 * states[:, 1] <= 0.1
+
+
+def test_the_line_between_two_actions_is_found_by_its_own_features() -> None:
+    states = drawn()
+    table = shown(states, braking(states))
+    (line,) = found(table)
+    weights = dict(line.terms)
+    assert set(weights) == {"gap", "speed"}
+    assert weights["speed"] / weights["gap"] == pytest.approx(-0.08, rel=0.05)
+    assert line.terms[0][1] == 1
+    with_it = fit(table, FitOptions(Vocabulary(combinations=(line,))))
+    assert with_it.leaves <= fit(table).leaves / 3
+
+
+def test_a_line_is_found_where_one_step_in_twenty_is_a_mistake() -> None:
+    states = drawn()
+    chosen = braking(states) ^ (np.random.default_rng(2).random(len(states)) < 0.05)
+    weights = [dict(line.terms) for line in found(shown(states, chosen))]
+    assert [set(its) for its in weights] == [{"gap", "speed"}]
+    assert weights[0]["speed"] / weights[0]["gap"] == pytest.approx(-0.08, rel=0.3)
+
+
+def test_lines_of_several_actions_are_found_one_after_the_other() -> None:
+    states = drawn(800)
+    first = states[:, 0] - 0.08 * states[:, 1] <= 0.1
+    second = states[:, 2] + 0.05 * states[:, 1] <= 0
+    lines = found(shown(states, np.where(first, 0, np.where(second, 1, 2))))
+    assert {frozenset(dict(line.terms)) for line in lines} == {
+        frozenset({"gap", "speed"}),
+        frozenset({"noise", "speed"}),
+    }
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        lambda states: states[:, 0] <= 0.1,
+        lambda states: (states[:, 0] <= 0.1) & (states[:, 1] > 2),
+        lambda states: np.random.default_rng(3).random(len(states)) < 0.3,
+        lambda states: np.abs(states[:, 0]) <= 0.3,
+        lambda states: np.zeros(len(states)),
+    ],
+    ids=["one feature", "two features", "by chance", "an interval", "one action"],
+)
+def test_no_sum_is_offered_where_none_is_weighed(chosen) -> None:
+    states = drawn()
+    assert found(shown(states, chosen(states))) == ()
+
+
+def test_places_of_a_grid_are_not_weighed() -> None:
+    states = np.round(drawn())
+    states[:, 1] = np.round(states[:, 1] / 2)
+    assert found(shown(states, states[:, 0] + states[:, 1] <= 1)) == ()
+
+
+def test_what_is_missing_is_left_out() -> None:
+    states = drawn()
+    chosen = braking(states)
+    states[::7, 1] = np.nan
+    (line,) = found(shown(states, chosen))
+    assert set(dict(line.terms)) == {"gap", "speed"}
+
+
+def test_sums_of_the_largest_numbers_are_not_offered() -> None:
+    states = drawn()
+    chosen = braking(states)
+    assert found(shown(states * (9e37, 9e36, 9e37), chosen)) == ()
+
+
+def test_binary_and_lagged_features_are_not_weighed() -> None:
+    states = drawn()
+    before = Feature("gap[t-1]", index=0, lag=1)
+    features = (Feature("gap"), before, Feature("on", FeatureKind.BINARY))
+    states[:, 2] = states[:, 2] > 0
+    chosen = states[:, 0] - 0.08 * states[:, 1] <= 0.1
+    assert found(shown(states, chosen, features)) == ()
+
+
+@settings(max_examples=30)
+@given(some.tables(min_rows=2, max_rows=30), some.vocabularies)
+def test_whatever_was_shown_sums_make_the_description_shorter_or_there_are_none(
+    table: DemonstrationTable, vocabulary: Vocabulary
+) -> None:
+    options = FitOptions(vocabulary)
+    sums = likely_sums(table, fit(table, options), options)
+    assert len(sums) <= 4
+    assert sums == likely_sums(table, fit(table, options), options)
