@@ -43,6 +43,8 @@ _DIGITS = 2
 _WEIGHT_BITS = 1 + math.log2(9 * 10 ** (_DIGITS - 1))
 #: How large weights of states that are scaled to their spread may be: a variance, as of a prior.
 _LOOSE = 100.0
+#: Of more features than that, several are left out at a time.
+_FEW = 8
 #: Steps of Newton's method, of which a dozen do, and when there is no more to gain.
 _MOST_STEPS, _CLOSE = 30, 1e-6
 
@@ -71,7 +73,8 @@ def likely_sums(
             for one in dict.fromkeys(_lines(table, best.fitted, measured))
             if one not in best.sums
         ]
-        tried = [describing.by((*best.sums, one)) for one in describing.likely(best.sums, found)]
+        likely = describing.likely(best, found)
+        tried = [describing.by((*best.sums, one)) for one in likely]
         shortest = min(tried, key=lambda one: one.bits, default=best)
         if shortest.bits >= best.bits:
             break
@@ -108,13 +111,16 @@ class _Describing:
         stating = self._term_bits * sum(len(one.terms) for one in sums)
         return _Described(fitted, sums, shortest_description(fitted).bits + stating)
 
-    def likely(
-        self, sums: tuple[WeightedSum, ...], found: Sequence[WeightedSum]
-    ) -> Sequence[WeightedSum]:
-        """Those of some further sums that a tree with all of them makes most use of."""
+    def likely(self, best: _Described, found: Sequence[WeightedSum]) -> Sequence[WeightedSum]:
+        """Those of some further sums that a tree with all of them makes most use of.
+
+        There are none where not even that tree is shorter to say.
+        """
         if len(found) <= _MOST_TRIED:
             return found
-        fitted = self._fitted((*sums, *found))
+        fitted = self._fitted((*best.sums, *found))
+        if shortest_description(fitted).bits >= best.bits:
+            return ()
         gains = dict(zip(fitted.asked, fitted.gains.tolist(), strict=True))
         return sorted(found, key=lambda one: -gains[Number(one)])[:_MOST_TRIED]
 
@@ -185,7 +191,7 @@ def _some(rows: IntArray) -> IntArray:
 def _line(states: FloatArray, is_second: BoolArray, names: Sequence[str]) -> WeightedSum | None:
     """The sum that tells two actions apart in the fewest bits; None where one feature does.
 
-    Features are left out one by one, always the one that matters least.
+    Features are left out one by one, always the one that matters least; of many, several at a time.
     """
     low, high = np.percentile(states, (5, 95), axis=0)
     spread = np.where(high > low, high - low, np.ptp(states, axis=0))
@@ -200,7 +206,8 @@ def _line(states: FloatArray, is_second: BoolArray, names: Sequence[str]) -> Wei
         bits = exceptions * exception_bits + len(use) * term_bits
         if bits <= least:
             least, best = bits, weights
-        use = np.delete(use, np.argmin(np.abs(weights[use])))
+        ranked = np.argsort(np.abs(weights[use]), kind="stable")
+        use = np.delete(use, ranked[: max(1, len(use) // _FEW)])
     if np.count_nonzero(best) < 2:
         return None
     return _as_sum(best, np.where(spread > 0, spread, 1.0), np.abs(states).max(axis=0), names)

@@ -75,7 +75,6 @@ def _read(quantity: Quantity, variables: Mapping[str, Variable]) -> str:
         case Difference(minuend=minuend, subtrahend=subtrahend):
             return f"({variables[minuend].name} - {variables[subtrahend].name})"
         case WeightedSum(terms=terms):
-            # The engine reads no sign in front of a number.
             products = (f"({number(weight)} * {variables[name].name})" for name, weight in terms)
             return reduce(lambda total, product: f"({total} + {product})", products)
         case str():

@@ -259,6 +259,8 @@ class _Choice:
         if not sums or options.sums is Use.ALWAYS:
             return with_them
         choices = partial(own_history_choices, options=options, psa=False)
+        # Lines were drawn through the rows of all folds, which flatters them a little: this holds
+        # back only what is worse all the same.
         before, after = (
             self.judged(one, telling=True).levels(choices) for one in (vocabulary, with_them)
         )
