@@ -28,8 +28,9 @@ import rebt_ros
 #: Where the package under test is, installed or not.
 HOME = Path(rebt_ros.__file__).parents[1]
 
-#: What Python and its libraries read while they start.
-_OF_THE_START = ("PYTHON", "LC_", "LANG", "LD_", "OPENBLAS_", "OMP_")
+#: What Python and its libraries read while they start.  How many threads linear algebra has, which
+#: a cluster's nanny sets for everybody who comes after it, is the same for all that are forked.
+_OF_THE_START = ("PYTHON", "LC_", "LANG", "LD_")
 
 #: As the tests began, whatever one of them changes meanwhile.
 _ENVIRONMENT = dict(os.environ)

@@ -3,8 +3,9 @@
 Whoever weighs one measurement against another, as in braking by distance and speed or in balancing,
 draws a slanted line through the states.  A tree that compares one feature at a time follows it in
 steps, with many splits that many rows are needed for.  So lines are looked for in the parts of a
-tree that have many leaves.  Each parts two actions, by as few features as pay for themselves, and
-is offered where the whole description of the rows gets shorter by it (see `description_length`).
+tree that have many leaves.  Each parts two actions, by as few features as pay for themselves, is
+drawn once more through the rows that are close to it, which tell best where it lies, and is offered
+where the whole description of the rows gets shorter by it (see `description_length`).
 """
 
 from __future__ import annotations
@@ -38,11 +39,11 @@ _MOST_PARTS, _LEAST_LEAVES = 4, 4
 _MOST_ACTIONS, _LEAST_ROWS = 4, 8
 #: Of more rows of an action, so many tell enough.
 _MOST_ROWS = 500
-#: Significant digits of a weight, and the bits of one, which has a sign.
-_DIGITS = 2
-_WEIGHT_BITS = 1 + math.log2(9 * 10 ** (_DIGITS - 1))
-#: How large weights of states that are scaled to their spread may be: a variance, as of a prior.
-_LOOSE = 100.0
+#: Significant digits of weights that are tried, and of those of a line while it is looked for.
+_DIGITS, _USUAL = (2, 3), 2
+#: How large weights of states that are scaled to their spread may be, while a line is looked for,
+#: and once it is drawn through the rows that are close to it: a variance, as of a prior.
+_LOOSE, _LOOSER = 1e2, 1e6
 #: Of more features than that, several are left out at a time.
 _FEW = 8
 #: Steps of Newton's method, of which a dozen do, and when there is no more to gain.
@@ -103,12 +104,14 @@ class _Describing:
 
     def __init__(self, table: DemonstrationTable, options: FitOptions, features: int) -> None:
         self._table, self._options = table, options
-        self._term_bits = _term_bits(features)
+        self._features = features
 
     def by(self, sums: tuple[WeightedSum, ...]) -> _Described:
         """By the tree that may test some sums."""
         fitted = self._fitted(sums)
-        stating = self._term_bits * sum(len(one.terms) for one in sums)
+        stating = sum(
+            _term_bits(self._features, _digits(weight)) for one in sums for _, weight in one.terms
+        )
         return _Described(fitted, sums, shortest_description(fitted).bits + stating)
 
     def likely(self, best: _Described, found: Sequence[WeightedSum]) -> Sequence[WeightedSum]:
@@ -129,9 +132,14 @@ class _Describing:
         return fit(self._table, replace(self._options, vocabulary=vocabulary))
 
 
-def _term_bits(features: int) -> float:
-    """What it takes to state a feature and its weight."""
-    return math.log2(features) + _WEIGHT_BITS
+def _term_bits(features: int, digits: int = _USUAL) -> float:
+    """What it takes to state a feature and its weight, which has a sign."""
+    return math.log2(features) + 1 + math.log2(9 * 10 ** (digits - 1))
+
+
+def _digits(weight: float) -> int:
+    """How many significant digits a weight has, of those that are tried."""
+    return next((few for few in _DIGITS if float(f"{weight:.{few}g}") == weight), _DIGITS[-1])
 
 
 def _measured(table: DemonstrationTable) -> list[int]:
@@ -158,11 +166,8 @@ def _lines(
         counts = np.bincount(chosen, minlength=len(table.actions))
         frequent = np.argsort(-counts, kind="stable")[:_MOST_ACTIONS]
         for pair in combinations(frequent[counts[frequent] >= _LEAST_ROWS].tolist(), 2):
-            first, second = (_some(rows[chosen == action]) for action in pair)
-            is_second = np.repeat([False, True], [len(first), len(second)])
-            line = _line(states[np.concatenate([first, second])], is_second, names)
-            if line is not None:
-                yield line
+            either = rows[np.isin(chosen, pair)]
+            yield from _line(states[either], table.chosen[either] == pair[1], names)
 
 
 def _parts(table: DemonstrationTable, fitted: FittedTree) -> Iterator[BoolArray]:
@@ -183,13 +188,16 @@ def _parts(table: DemonstrationTable, fitted: FittedTree) -> Iterator[BoolArray]
         yield below[reached]
 
 
-def _some(rows: IntArray) -> IntArray:
-    """The rows, or as many of them, evenly spread, as tell enough."""
-    return rows[:: -(-len(rows) // _MOST_ROWS)]
+def _some(is_second: BoolArray) -> IntArray:
+    """As many rows of each action, evenly spread, as tell enough."""
+    of_each = (np.flatnonzero(is_second == which) for which in (False, True))
+    return np.concatenate([rows[:: -(-len(rows) // _MOST_ROWS)] for rows in of_each])
 
 
-def _line(states: FloatArray, is_second: BoolArray, names: Sequence[str]) -> WeightedSum | None:
-    """The sum that tells two actions apart in the fewest bits; None where one feature does.
+def _line(states: FloatArray, is_second: BoolArray, names: Sequence[str]) -> Iterator[WeightedSum]:
+    """The sum that tells two actions apart in the fewest bits, with few digits and with more.
+
+    There is none where one feature does.
 
     Features are left out one by one, always the one that matters least; of many, several at a time.
     """
@@ -197,29 +205,66 @@ def _line(states: FloatArray, is_second: BoolArray, names: Sequence[str]) -> Wei
     spread = np.where(high > low, high - low, np.ptp(states, axis=0))
     use = np.flatnonzero(spread > 0)
     scaled = (states - np.median(states, axis=0)) / np.where(spread > 0, spread, 1.0)
-    exception_bits, term_bits = math.log2(len(states)), _term_bits(max(len(use), 1))
-    least, best = math.inf, np.zeros(len(names))
+    some = _some(is_second)
+    exception_bits, term_bits = math.log2(len(some)), _term_bits(max(len(use), 1))
+    least, best, at = math.inf, np.zeros(len(names)), 0.0
     while len(use):
-        weights = np.zeros(len(names))
-        *weights[use], offset = _logistic_regression(scaled[:, use], is_second)
-        exceptions = np.count_nonzero((scaled @ weights + offset > 0) != is_second)
+        weights, offset = _drawn(scaled[some], is_second[some], use, _LOOSE)
+        exceptions = _exceptions(scaled[some], is_second[some], weights, offset)
         bits = exceptions * exception_bits + len(use) * term_bits
         if bits <= least:
-            least, best = bits, weights
+            least, best, at = bits, weights, offset
         ranked = np.argsort(np.abs(weights[use]), kind="stable")
         use = np.delete(use, ranked[: max(1, len(use) // _FEW)])
     if np.count_nonzero(best) < 2:
-        return None
-    return _as_sum(best, np.where(spread > 0, spread, 1.0), np.abs(states).max(axis=0), names)
+        return
+    close = _closest(np.abs(scaled @ best + at), is_second)
+    weights, offset = _drawn(scaled[close], is_second[close], np.flatnonzero(best), _LOOSER)
+    before, after = (
+        _exceptions(scaled, is_second, *line) for line in ((best, at), (weights, offset))
+    )
+    best = weights if after < before else best
+    largest = np.abs(states).max(axis=0)
+    for digits in _DIGITS:
+        found = _as_sum(best, np.where(spread > 0, spread, 1.0), largest, names, digits)
+        if found is not None:
+            yield found
+
+
+def _closest(distances: FloatArray, is_second: BoolArray) -> IntArray:
+    """The rows of each action that are closest to a line, as many as tell enough."""
+    ranked = np.argsort(distances, kind="stable")
+    of_each = (ranked[is_second[ranked] == which] for which in (False, True))
+    return np.concatenate([rows[:_MOST_ROWS] for rows in of_each])
+
+
+def _drawn(
+    scaled: FloatArray, is_second: BoolArray, use: IntArray, variance: float
+) -> tuple[FloatArray, float]:
+    """A line by some of the features: weights of all, and the offset."""
+    weights = np.zeros(scaled.shape[1])
+    *weights[use], offset = _logistic_regression(scaled[:, use], is_second, variance)
+    return weights, float(offset)
+
+
+def _exceptions(
+    scaled: FloatArray, is_second: BoolArray, weights: FloatArray, offset: float
+) -> int:
+    """How many rows are on the wrong side of a line."""
+    return int(np.count_nonzero((scaled @ weights + offset > 0) != is_second))
 
 
 def _as_sum(
-    scaled: FloatArray, spread: FloatArray, largest: FloatArray, names: Sequence[str]
+    scaled: FloatArray,
+    spread: FloatArray,
+    largest: FloatArray,
+    names: Sequence[str],
+    digits: int,
 ) -> WeightedSum | None:
     """The sum of the features themselves, the one that matters most first, with a weight of 1."""
     order = [place for place in np.argsort(-np.abs(scaled), kind="stable") if scaled[place]]
     own = scaled / spread
-    weights = [float(f"{own[place] / own[order[0]]:.{_DIGITS}g}") for place in order]
+    weights = [float(f"{own[place] / own[order[0]]:.{digits}g}") for place in order]
     reach = sum(abs(weight) * largest[place] for weight, place in zip(weights, order, strict=True))
     if not all(weights) or not reach <= LARGEST_VALUE or weights == [1.0, -1.0]:
         return None
@@ -228,7 +273,7 @@ def _as_sum(
     )
 
 
-def _logistic_regression(scaled: FloatArray, is_second: BoolArray) -> FloatArray:
+def _logistic_regression(scaled: FloatArray, is_second: BoolArray, variance: float) -> FloatArray:
     """A line between two actions that count alike, however many rows they have.
 
     By Newton's method, halving steps that go too far.  On so few rows scikit-learn's solver takes
@@ -237,6 +282,7 @@ def _logistic_regression(scaled: FloatArray, is_second: BoolArray) -> FloatArray
     Args:
         scaled: Shape (rows, features).
         is_second: Shape (rows,).
+        variance: How large weights may be.
 
     Returns:
         Weights of the features and, behind them, the offset, shape (features + 1,).
@@ -244,7 +290,7 @@ def _logistic_regression(scaled: FloatArray, is_second: BoolArray) -> FloatArray
     matrix = np.column_stack([scaled, np.ones(len(scaled))])
     sign = np.where(is_second, 1.0, -1.0)
     share = np.where(is_second, 0.5 / is_second.sum(), 0.5 / (~is_second).sum()) * len(scaled)
-    ridge = np.full(matrix.shape[1], 1 / _LOOSE)
+    ridge = np.full(matrix.shape[1], 1 / variance)
     ridge[-1] = 1e-9
 
     def loss(solution: FloatArray) -> float:
