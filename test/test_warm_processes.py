@@ -9,7 +9,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from warm_processes import WarmProcess, can_start, run
+from warm_processes import WarmProcess, as_begun, can_start, run
 
 
 def test_what_it_writes_and_its_exit_code_are_those_of_the_module(tmp_path: Path) -> None:
@@ -28,7 +28,7 @@ def test_a_signal_ends_it_and_it_ends_by_itself() -> None:
         with open(os.devnull, "w") as nothing, os.fdopen(theirs) as typed:
             files = (typed.fileno(), nothing.fileno(), nothing.fileno())
             process = WarmProcess(
-                "json.tool", [], environment=os.environ, directory=Path.cwd(), files=files
+                "json.tool", [], environment=as_begun(), directory=Path.cwd(), files=files
             )
         with os.fdopen(ours, "wb") as typing:
             assert process.poll() is None
@@ -50,8 +50,8 @@ def test_ros_can_be_hidden() -> None:
 
 
 def test_what_differs_from_its_first_line_on_is_started_as_usual() -> None:
-    assert can_start(os.environ | {"HOME": "/nowhere", "ROS_DOMAIN_ID": "7"})
-    assert not can_start(os.environ | {"PYTHONIOENCODING": "ascii"})
-    assert not can_start(os.environ | {"PYTHONPATH": "/somewhere/else"})
+    assert can_start(as_begun() | {"HOME": "/nowhere", "ROS_DOMAIN_ID": "7"})
+    assert not can_start(as_begun() | {"PYTHONIOENCODING": "ascii"})
+    assert not can_start(as_begun() | {"PYTHONPATH": "/somewhere/else"})
     with pytest.raises(AssertionError, match="starts as usual"):
         run("json.tool", LC_ALL="of nowhere")

@@ -143,7 +143,7 @@ def run(
         process = WarmProcess(
             module,
             words,
-            environment=os.environ | variables,
+            environment=as_begun() | variables,
             directory=directory or Path.cwd(),
             files=(none.fileno(), out.fileno(), err.fileno()),
             ros=ros,
@@ -158,6 +158,15 @@ def run(
             one.seek(0)
             texts.append(one.read().decode())
     return subprocess.CompletedProcess([module, *words], code, *texts)
+
+
+def as_begun() -> dict[str, str]:
+    """The environment of this process, without what it has changed of what is read at a start."""
+    now, began = (
+        {name: value for name, value in one.items() if name.startswith(_OF_THE_START) is at_start}
+        for one, at_start in ((os.environ, False), (_ENVIRONMENT, True))
+    )
+    return now | began
 
 
 def use() -> None:

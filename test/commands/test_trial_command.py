@@ -16,6 +16,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+import warm_processes
 from ros_processes import LATCHED, PATIENCE, NodeProcess, Peer, values_of, wait_until
 from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import Trigger
@@ -56,7 +57,7 @@ class TrialProcess:
 
     def __init__(self, arguments: list[str], domain: int, directory: Path) -> None:
         environment = dict(
-            os.environ,
+            warm_processes.as_begun(),
             ROS_DOMAIN_ID=str(domain),
             ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
             ROS_LOG_DIR=str(directory / "log"),
