@@ -19,14 +19,12 @@ from hypothesis import strategies as st
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.logic.conditions import (
-    Difference,
     HasCategory,
     Interval,
     IsTrue,
     LastActionIs,
     PreviousActionIs,
     Threshold,
-    WeightedSum,
     features_of,
 )
 
@@ -113,15 +111,7 @@ def where(condition: object, states: Everything) -> np.ndarray:
         case LastActionIs(action=action, deciding=deciding):
             return states.of_histories(lambda one: one.before(*deciding) == action, condition)
     columns = [states.column(name) for name in features_of(condition)]
-    value = columns[0]
-    match condition:
-        case Threshold(quantity=Difference()) | Interval(quantity=Difference()):
-            value = columns[0] - columns[1]
-        case (
-            Threshold(quantity=WeightedSum(terms=((_, first), (_, second))))
-            | Interval(quantity=WeightedSum(terms=((_, first), (_, second))))
-        ):
-            value = first * columns[0] + second * columns[1]
+    value = some.computed(condition, columns)
     match condition:
         case Threshold(value=most):
             return value <= most

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -140,6 +141,19 @@ def holds(
     return _satisfied(literal.condition, state, last_action, previous) is literal.positive
 
 
+def computed(condition: Condition, values: Sequence[Any]) -> Any:
+    """What a condition compares, of the values of its features, read from the definitions alone."""
+    match condition:
+        case Threshold(quantity=Difference()) | Interval(quantity=Difference()):
+            return values[0] - values[1]
+        case (
+            Threshold(quantity=WeightedSum(terms=((_, first), (_, second))))
+            | Interval(quantity=WeightedSum(terms=((_, first), (_, second))))
+        ):
+            return first * values[0] + second * values[1]
+    return values[0]
+
+
 def _satisfied(
     condition: Condition, state: Sequence[float], last_action: str | None, previous: str | None
 ) -> bool:
@@ -152,15 +166,7 @@ def _satisfied(
     values = [state[place] for place in places]
     if any(map(math.isnan, values)):
         return False
-    value = values[0]
-    match condition:
-        case Threshold(quantity=Difference()) | Interval(quantity=Difference()):
-            value = values[0] - values[1]
-        case (
-            Threshold(quantity=WeightedSum(terms=((_, first), (_, second))))
-            | Interval(quantity=WeightedSum(terms=((_, first), (_, second))))
-        ):
-            value = first * values[0] + second * values[1]
+    value = computed(condition, values)
     match condition:
         case Threshold(value=threshold):
             return value <= threshold

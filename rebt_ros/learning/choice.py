@@ -221,6 +221,7 @@ class _Choice:
         large = len(self.shown) > _LARGE
         self._telling = part_of(self.shown, _ROWS_THAT_TELL) if large else self.shown
         self._made: dict[tuple[bool, Vocabulary], CrossValidation] = {}
+        self._likely: dict[Vocabulary, tuple[Difference, ...]] = {}
         self.reasons: list[str] = []
 
     def judged(self, vocabulary: Vocabulary, *, telling: bool = False) -> CrossValidation:
@@ -345,7 +346,11 @@ class _Choice:
         options = self._options
         if options.differences is Use.NEVER:
             return ()
-        return likely_differences(self._telling, vocabulary, options.units, options.random_state)
+        if vocabulary not in self._likely:
+            self._likely[vocabulary] = likely_differences(
+                self._telling, vocabulary, options.units, options.random_state
+            )
+        return self._likely[vocabulary]
 
     def _with_differences(self, vocabulary: Vocabulary) -> Vocabulary:
         """With the differences that are worth it."""

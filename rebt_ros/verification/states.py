@@ -142,7 +142,8 @@ class StateFinder:
         self._features = features
         self._shown = shown
         self._place = {feature.name: place for place, feature in enumerate(features)}
-        self._tests = StateTests(features)
+        tests = StateTests(features)
+        self._readings = [(field, tests.reading(one)) for field, one in grid.combinations]
 
     @property
     def no_boxes(self) -> Boxes:
@@ -245,13 +246,6 @@ class StateFinder:
         known = np.where(missing, 1.0, known)
         return np.concatenate([known, np.where(missing, 0.0, 1.0)], axis=1)
 
-    def _restricted(self, box: Boxes) -> Iterator[tuple[Field, BoolArray]]:
-        """The fields of which the box does not have all cells."""
-        for field in self._grid.fields:
-            cells = field.cells_of(box[:, np.newaxis])[0]
-            if not cells.all():
-                yield field, cells
-
     def point(self, box: Boxes, row: int | None) -> Point | None:
         """A state in the box, near to a row; None if there is none.
 
@@ -313,9 +307,9 @@ class StateFinder:
         return kind is not FeatureKind.CATEGORICAL or math.isnan(value) or value in field.ends
 
     def _fits(self, box: Boxes, values: Sequence[float]) -> bool:
-        for field, quantity in self._grid.combinations:
+        for field, read in self._readings:
             cells = field.cells_of(box[:, np.newaxis])[0]
-            if not cells[field.cell(self._tests.reading(quantity)(values))]:
+            if not cells[field.cell(read(values))]:
                 return False
         return True
 
