@@ -91,7 +91,11 @@ HOMES: Final = {
         "rebt_ros.verification.linear_bounds",
     ),
     "sklearn": ("rebt_ros.decision_tree", "rebt_ros.decision_tree.*"),
-    "yaml": ("rebt_ros.robot_file.*", "rebt_ros.verification.rules_file"),
+    "yaml": (
+        "rebt_ros.robot_file.*",
+        "rebt_ros.ros.parameter_files",
+        "rebt_ros.verification.rules_file",
+    ),
     "zmq": ("rebt_ros.live.groot2_server",),
 }
 

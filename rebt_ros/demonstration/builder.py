@@ -34,6 +34,7 @@ class Fault(Enum):
     UNKNOWN_TOPIC = "unknown topic"
     EMPTY = "empty message"
     LENGTH = "unexpected length"
+    NAMES = "unexpected names"
     NOT_FINITE = "value that is not finite"
     TOO_LARGE = "value that is too large"
     LABEL = "unusable action label"
@@ -104,6 +105,8 @@ class DemonstrationBuilder:
                 f"second, not at {sample_rate}."
             )
         self._fields: dict[str, tuple[str, ...]] = {one.name: one.fields for one in topics}
+        # Topics of which the messages themselves say what their values are.
+        self._self_named: set[str] = set()
         self._may_miss = frozenset(one.name for one in topics if one.may_miss)
         self._latest: dict[str, tuple[float, ...]] = {}
         self._recent = {} if recent is None else recent
@@ -135,7 +138,9 @@ class DemonstrationBuilder:
             stamp: What rows say that it completes, nanoseconds: when it was received, as a rule.
             topic: State topic it came on.
             values: Its numbers.
-            labels: Names that the message itself gives to its numbers; used once, if at all.
+            labels: Names that the message itself gives to its numbers.  Those of the topic's first
+                message name its features, if nothing else does; where a later message has them in
+                another order, its numbers are put in theirs.
             sent: When it was sent, nanoseconds, by the clock of all messages; None: not known.
 
         Returns:
@@ -146,14 +151,16 @@ class DemonstrationBuilder:
         """
         state = tuple(map(float, values))
         self._check_state(topic, state)
+        if topic in self._self_named:
+            state = self._by_name(topic, state, labels)
         due = self._sample_until(stamp)
         if topic not in self._latest and not self._fields[topic]:
-            named = len(labels) == len(state) == len(set(labels)) and all(labels)
-            self._fields[topic] = (
-                tuple(labels)
-                if named
-                else tuple(f"{_base(topic)}[{index}]" for index in range(len(state)))
-            )
+            if _names(labels, state):
+                self._fields[topic] = tuple(labels)
+                self._self_named.add(topic)
+            else:
+                base = _base(topic)
+                self._fields[topic] = tuple(f"{base}[{index}]" for index in range(len(state)))
         self._latest[topic] = state
         if sent is None:
             self._recent.pop(topic, None)
@@ -265,6 +272,29 @@ class DemonstrationBuilder:
                     f"values must lie within ±{LARGEST_VALUE:g}.",
                 )
 
+    def _by_name(
+        self, topic: str, state: tuple[float, ...], labels: Sequence[str]
+    ) -> tuple[float, ...]:
+        """The values of a message in the order of the features.
+
+        Raises:
+            BadMessageError: Its names are other ones.
+        """
+        fields = self._fields[topic]
+        if tuple(labels) == fields or not _names(labels, state):
+            return state
+        places = {label: place for place, label in enumerate(labels)}
+        if len(fields) == 1:
+            # A label may say anything of a single value, such as its unit or a count.
+            return state
+        if places.keys() != set(fields):
+            raise BadMessageError(
+                Fault.NAMES,
+                f"state topic {topic!r} calls its values {', '.join(labels)}, and before "
+                f"{', '.join(fields)}: what they are called must not change.",
+            )
+        return tuple(state[places[name]] for name in fields)
+
     def _row(
         self, stamp: int, channel: str, label: str, states: Iterable[tuple[float, ...]]
     ) -> Row:
@@ -308,6 +338,11 @@ def is_label(text: str) -> bool:
     (True, False, False)
     """
     return bool(text) and text.isprintable()
+
+
+def _names(labels: Sequence[str], state: Sequence[float]) -> bool:
+    """Whether labels name every value."""
+    return len(labels) == len(state) == len(set(labels)) and all(labels)
 
 
 def _base(topic: str) -> str:

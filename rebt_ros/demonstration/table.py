@@ -24,6 +24,8 @@ from rebt_ros.errors import InputError, OptionError
 
 #: Rows that are looked at before all of them are.
 _FIRST_ROWS = 1000
+#: Names of features in a sentence.
+_LISTED = 5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -313,6 +315,10 @@ def _before(
     )
 
 
+def _shortened(names: Sequence[str]) -> str:
+    return ", ".join([*names[:_LISTED], *(["…"] if len(names) > _LISTED else [])])
+
+
 def _joined_states(
     demonstrations: Sequence[Demonstration],
 ) -> tuple[tuple[Feature, ...], FloatArray]:
@@ -320,7 +326,13 @@ def _joined_states(
     for other in demonstrations[1:]:
         mine, its = [one.name for one in first.features], [one.name for one in other.features]
         if mine != its:
-            differing = sorted(set(mine) ^ set(its)) or its
+            differing = sorted(set(mine) ^ set(its))
+            if not differing:
+                raise InputError(
+                    f"{first.name} and {other.name} have the same features in different orders "
+                    f"({_shortened(mine)}; {_shortened(its)}): record them in one order, or learn "
+                    "from those of one order."
+                )
             raise InputError(
                 f"{first.name} and {other.name} have different features "
                 f"({', '.join(differing[:3])}): learn from demonstrations of one robot and set-up."

@@ -20,6 +20,9 @@ from rebt_ros.storage.recording_head import Origin
 #: Kind of the fault that a row could not be written.
 WRITE_ERROR = "write error"
 
+#: Kind of the fault that simulated time was set back.
+SET_BACK = "simulated time set back"
+
 #: Pause between attempts to open a file where writing failed (seconds).
 _RETRY_AFTER = 1.0
 
@@ -166,6 +169,7 @@ class RecordingSession:
         message = _Message(stamp, values, labels, sent)
         if self._builder is None:
             self._latest[topic] = message
+            self._unclear.discard(topic)
             return
         with self._noting_faults():
             # What is refused may be an intruder or the first of a new length: a demonstration to
@@ -288,6 +292,27 @@ class RecordingSession:
         return Answer(
             True, f"discarded {_count(rows)} in {writer.path}; a new demonstration has begun."
         )
+
+    def set_back(self, stamp: int) -> None:
+        """Simulated time begins anew: so does the demonstration, and what was before is not known.
+
+        Args:
+            stamp: What time it is now.
+        """
+        # They are kept for what their values are called.
+        self._unclear.update(self._latest)
+        self._recent.clear()
+        self._held.clear()
+        if not self.recording:
+            return
+        if self._writer is not None:
+            self._note(
+                SET_BACK,
+                "simulated time was set back: the demonstration ends with "
+                f"{_count(self._writer.rows)}, and another one begins.",
+            )
+        self._end(stamp)
+        self._begin(stamp, Origin.FAILED if self.awaited else Origin.DEMONSTRATION)
 
     def sync(self, stamp: int) -> None:
         """Makes the rows written so far survive a loss of power."""

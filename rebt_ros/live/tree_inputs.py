@@ -11,7 +11,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import StateEncoder
 from rebt_ros.demonstration.builder import BadMessageError, Fault
-from rebt_ros.demonstration.schema import sources
+from rebt_ros.demonstration.schema import Feature, sources
 from rebt_ros.robot_file.robot_file import RobotFile
 
 
@@ -21,6 +21,8 @@ class Message(NamedTuple):
     values: Sequence[float]
     received: int
     """Nanoseconds."""
+    names: tuple[str, ...] = ()
+    """What the message itself calls its values; empty where it does not."""
 
 
 class TreeInputs:
@@ -45,6 +47,8 @@ class TreeInputs:
         }
         robot = learned.robot
         self._may_miss = robot is not None
+        self._fields = _fields(learned.features, self._read.values(), default_topic)
+        self._places: dict[str, tuple[tuple[str, ...], Mapping[int, int]]] = {}
         self._encoder = StateEncoder(tuple(self._read.values()), coded=self._may_miss)
         self._state = [math.nan] * len(learned.features)
         self._timeout = timeout
@@ -63,10 +67,15 @@ class TreeInputs:
     def accept(self, topic: str, message: Message) -> None:
         """Takes a message of one of the topics.
 
+        Where it names its values, and in another order than when the tree was learned, they are
+        taken by their names.
+
         Raises:
-            BadMessageError: It has too few values, or one that the tree tests is not finite; it is
-                left out, so that the topic goes stale unless a better one follows.
+            BadMessageError: It has too few values, none of a name that the tree tests, or one that
+                the tree tests is not finite; it is left out, so that the topic goes stale unless a
+                better one follows.
         """
+        message = self._placed(topic, message)
         needed = self._encoder.topics[topic]
         if len(message.values) < needed:
             raise BadMessageError(
@@ -90,15 +99,39 @@ class TreeInputs:
         """Forgets all messages, as where the clock was set back: what it says of them is wrong."""
         self._latest.clear()
 
-    def too_short(self, latest: Mapping[str, Message]) -> str:
-        """Which of the messages has too few values for the tree, in words; empty for none."""
+    def misfit(self, latest: Mapping[str, Message]) -> str:
+        """Which of the messages lacks values that the tree reads, in words; empty for none."""
         for topic, needed in self._encoder.topics.items():
-            if topic in latest and len(latest[topic].values) < needed:
-                return (
-                    f"state topic {topic!r} sends {len(latest[topic].values)} values "
-                    f"where the tree reads {needed}"
-                )
+            if topic not in latest:
+                continue
+            try:
+                count = len(self._placed(topic, latest[topic]).values)
+            except BadMessageError as err:
+                return str(err).rstrip(".")
+            if count < needed:
+                return f"state topic {topic!r} sends {count} values where the tree reads {needed}"
         return ""
+
+    def _placed(self, topic: str, message: Message) -> Message:
+        """The message with its values where the tree reads them.
+
+        Raises:
+            BadMessageError: It has none of a name that the tree tests, but others of its names.
+        """
+        fields = self._fields.get(topic, {})
+        if not message.names or not fields:
+            return message
+        names, places = self._places.get(topic, ((), {}))
+        if names != message.names:
+            places = _places(topic, message.names, fields)
+            self._places[topic] = message.names, places
+        if not places:
+            return message
+        missing = self._encoder.topics[topic] - len(message.values)
+        values = [*message.values, *[math.nan] * missing]
+        for index, place in places.items():
+            values[index] = message.values[place]
+        return message._replace(values=values)
 
     def stale(self, now: int) -> dict[str, str]:
         """The topics without a fresh message, and the age of their last one, in words."""
@@ -125,6 +158,40 @@ class TreeInputs:
     def reset(self) -> None:
         """Empties the window of lagged features, as the ticks to come do not follow the last."""
         self._encoder.reset()
+
+
+def _fields(
+    features: Sequence[Feature], read: Collection[Feature], default_topic: str
+) -> dict[str, dict[int, str]]:
+    """What the values of each topic were called that are read, by their index."""
+    fields: dict[str, dict[int, str]] = {}
+    needed = {(feature.topic, feature.index) for feature in read}
+    for feature, source in zip(features, sources(features, default_topic), strict=True):
+        if not feature.lag and (source.topic, source.index) in needed:
+            name = feature.name.removeprefix(f"{source.topic}/")
+            fields.setdefault(source.topic, {})[source.index] = name
+    return fields
+
+
+def _places(topic: str, names: Sequence[str], fields: Mapping[int, str]) -> Mapping[int, int]:
+    """Where a message has the values that are read, by their index; empty where they are there.
+
+    Names none of which is known say nothing: those of the features may come from elsewhere.
+
+    Raises:
+        BadMessageError: Some are known, and one that is read is missing.
+    """
+    if not set(names) & set(fields.values()):
+        return {}
+    for name in fields.values():
+        if name not in names:
+            raise BadMessageError(
+                Fault.NAMES,
+                f"state topic {topic!r} has no value called {name!r}, which the tree reads, among "
+                f"{', '.join(names)}: publish what was published when it was demonstrated.",
+            )
+    places = {index: names.index(name) for index, name in fields.items()}
+    return {} if all(index == place for index, place in places.items()) else places
 
 
 def _timeouts(robot: RobotFile, tested: Collection[str]) -> dict[str, int]:

@@ -35,6 +35,7 @@ from rclpy.utilities import ok, remove_ros_args, try_shutdown
 from rebt_ros.errors import RebtError
 from rebt_ros.ros.entry import STOP_SIGNALS
 from rebt_ros.ros.log_files import arguments_for_logging
+from rebt_ros.ros.parameter_files import without_effect
 
 #: What a user can get wrong with a node's arguments, parameters and remappings.
 _WRONG_START = (
@@ -72,10 +73,10 @@ def run(factory: Callable[[], Node], args: list[str] | None = None, *, threads: 
                 args=arguments_for_logging(given), signal_handler_options=SignalHandlerOptions.NO
             )
         except Exception as err:
-            _give_up(f"these arguments are not understood: {_first_sentence(err)}", err)
+            _give_up(_why_ros_does_not_start(err), err)
         try:
             if not stopped():
-                _live(factory, threads, stopped)
+                _live(factory, given, threads, stopped)
         finally:
             try_shutdown()
 
@@ -117,7 +118,12 @@ def _refuse_what_ros_cannot_write(args: Sequence[str]) -> None:
             )
 
 
-def _live(factory: Callable[[], Node], threads: int, stopped: Callable[[], bool]) -> None:
+def _live(
+    factory: Callable[[], Node],
+    args: Sequence[str],
+    threads: int,
+    stopped: Callable[[], bool],
+) -> None:
     try:
         node = factory()
     except _WRONG_START as err:
@@ -130,6 +136,8 @@ def _live(factory: Callable[[], Node], threads: int, stopped: Callable[[], bool]
             raise
         return
     try:
+        for sentence in without_effect(args, node.get_fully_qualified_name()):
+            node.get_logger().warning(sentence)
         _spin(node, threads, stopped)
     finally:
         _call(node, "close")
@@ -188,5 +196,10 @@ def _give_up(sentence: str, err: Exception | None) -> None:
     raise SystemExit(1) from err
 
 
-def _first_sentence(err: Exception) -> str:
-    return str(err).split(", at /")[0]
+def _why_ros_does_not_start(err: Exception) -> str:
+    said = str(err).split(", at /")[0].removeprefix("failed to initialize rcl: ")
+    if said.startswith("Couldn't parse") or type(err).__name__ == "UnknownROSArgsError":
+        return f"these arguments are not understood: {said}"
+    if os.environ.get("ROS_SECURITY_ENABLE", "").lower() == "true" and "not set" in said:
+        said = "SROS 2 is on, and there is no enclave for the node under ROS_SECURITY_KEYSTORE"
+    return f"ROS 2 does not start: {said}; check the environment variables ROS_* and RMW_*."

@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from operator import itemgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from textwrap import shorten
@@ -26,6 +25,7 @@ from rebt_ros.storage.mcap import MAGIC as MCAP_MAGIC
 from rebt_ros.storage.mcap import McapFile, Survey
 from rebt_ros.storage.packing import unpack_file, without_packing
 from rebt_ros.storage.text import unreadable
+from rebt_ros.storage.time_order import SET_BACK, by_time
 
 #: Suffixes of files that hold a bag's messages, in lower case.
 STORAGE_SUFFIXES: Final = (".mcap", ".db3")
@@ -86,8 +86,15 @@ class BagFiles:
         Among them are messages of the topic `GAP` where others are missing.
         """
         parts = self._parts(topics)
+        if len(self._readers) == 1:
+            return parts
         # Where the recorder went from one file to the next their times may overlap.
-        return iter(sorted(parts, key=itemgetter(1))) if len(self._readers) > 1 else parts
+        return iter(by_time(parts, lambda stamp: (GAP, stamp, b""), self.note_set_back))
+
+    def note_set_back(self) -> None:
+        """Notes that the clock was set back; once."""
+        if SET_BACK not in self.notes:
+            self.notes.append(SET_BACK)
 
     def _parts(self, topics: Collection[Topic]) -> Iterator[Message]:
         for number, read in enumerate(self._readers):
@@ -280,6 +287,8 @@ def _open_mcap(path: Path, name: str, bag: BagFiles) -> None:
         with path.open("rb") as file:
             for message in McapFile(file, survey).messages(wanted.keys()):
                 yield wanted[message.channel], message.stamp, message.data
+        if survey.set_back:
+            bag.note_set_back()
 
     counts, stated = Counter[Topic](), Counter[Topic]()
     for channel, topic in number.items():
@@ -344,6 +353,8 @@ def _open_sqlite(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None
         ):
             yield GAP if number == sqlite.GAP else topics[number], stamp, data
         bag.is_incomplete |= file.is_damaged
+        if file.set_back:
+            bag.note_set_back()
         bag.notes.extend(f"{name} {note}" for note in file.notes[known:])
 
     counts = Counter[Topic]()

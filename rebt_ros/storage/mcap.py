@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from typing import BinaryIO, Final, NamedTuple
 
 from rebt_ros.storage.packing import unlz4, unzstd
+from rebt_ros.storage.time_order import by_time
 
 #: Channel of what stands for messages that are missing.
 GAP: Final = -1
@@ -101,6 +102,8 @@ class Survey:
     """Whether the file has its end."""
     in_order: bool = True
     """Whether chunks follow each other in time."""
+    set_back: bool = False
+    """Whether the clock was set back between messages that were read."""
 
     @property
     def undeclared(self) -> int:
@@ -139,7 +142,7 @@ class McapFile:
                 if part is None:
                     yield McapMessage(GAP, latest, b"")
                 elif part:
-                    found = sorted(part, key=_stamp)
+                    found = self._by_time(part)
                     latest = found[-1].stamp
                     yield from found
             return
@@ -150,7 +153,13 @@ class McapFile:
                 everything.append(McapMessage(GAP, part[0].stamp, b""))
             is_gap = part is None or (is_gap and not part)
             everything += part or ()
-        yield from sorted(everything, key=_stamp)
+        yield from self._by_time(everything)
+
+    def _by_time(self, messages: list[McapMessage]) -> list[McapMessage]:
+        def told() -> None:
+            self.survey.set_back = True
+
+        return by_time(messages, lambda stamp: McapMessage(GAP, stamp, b""), told)
 
     def _parts_of(self, wanted: frozenset[int]) -> Iterator[list[McapMessage] | None]:
         """The messages of some channels in each part; None where some are missing."""
@@ -271,10 +280,6 @@ class McapFile:
             encoding, _ = _text(content, place)
             kind = self._schemas.get(schema, "")
             self.survey.channels[number] = McapChannel(topic, kind, encoding)
-
-
-def _stamp(message: McapMessage) -> int:
-    return message.stamp
 
 
 def packed_chunks(file: BinaryIO) -> Iterator[tuple[str, int, int]]:

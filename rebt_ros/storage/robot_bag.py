@@ -27,9 +27,10 @@ from rebt_ros.storage.bag import (
     unpacked,
     with_notes,
 )
-from rebt_ros.storage.bag_files import BagFiles, Message, Topic, opened_bag
+from rebt_ros.storage.bag_files import GAP, BagFiles, Message, Topic, opened_bag
 from rebt_ros.storage.message_types import BagTypes
 from rebt_ros.storage.read import Read
+from rebt_ros.storage.time_order import by_time
 
 #: The stamp of a header, behind the four bytes that messages begin with.
 _STAMPS: Final = {b"\0\1": struct.Struct("<iI"), b"\0\0": struct.Struct(">iI")}
@@ -164,7 +165,7 @@ def _in_order(path: Path, bag: BagFiles, wanted: dict[Topic, BoundTopic]) -> Ite
         (topic, _stamp_of(data, stamp) if topic in headed else stamp, data)
         for topic, stamp, data in messages
     )
-    return iter(sorted(stamped, key=lambda message: message[1]))
+    return iter(by_time(stamped, lambda stamp: (GAP, stamp, b""), bag.note_set_back))
 
 
 def _stamp_of(data: bytes, otherwise: int) -> int:

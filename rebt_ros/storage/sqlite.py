@@ -12,15 +12,15 @@ import sqlite3
 import struct
 import tempfile
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from operator import itemgetter
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
 
 from rebt_ros.storage.sqlite_pages import SqlitePages
+from rebt_ros.storage.time_order import by_time, set_back
 
 MAGIC: Final = b"SQLite format 3\0"
 
@@ -61,6 +61,8 @@ class SqliteFile:
     """What is wrong with it, in words that follow the file's name; no full stops."""
     is_damaged: bool = False
     """Whether it is read page by page."""
+    set_back: bool = False
+    """Whether the clock was set back between messages that were read."""
 
     @property
     def undeclared(self) -> int:
@@ -114,7 +116,10 @@ class SqliteFile:
                     wanted.append((GAP, one.stamp, b""))
                     is_gap = False
                 wanted.append((one.topic, one.stamp, one.data))
-        yield from sorted(wanted, key=itemgetter(1))
+        yield from by_time(wanted, lambda stamp: (GAP, stamp, b""), self._note_set_back)
+
+    def _note_set_back(self) -> None:
+        self.set_back = True
 
     def survey(self) -> None:
         """Notes the topics and counts the messages.
@@ -159,13 +164,24 @@ class SqliteFile:
             self._survey_pages(str(err))
 
     def _by_sqlite(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
-        marks = ", ".join("?" * len(numbers))
+        of_topics = f"FROM messages NOT INDEXED WHERE topic_id IN ({', '.join('?' * len(numbers))})"
         with contextlib.closing(_connected(self.path)) as connection:
-            for number, stamp, data in connection.execute(
-                "SELECT topic_id, timestamp, data FROM messages NOT INDEXED "
-                f"WHERE topic_id IN ({marks}) ORDER BY timestamp, id",
-                tuple(numbers),
-            ):
+            stamps = connection.execute(
+                f"SELECT topic_id, timestamp {of_topics} ORDER BY id", tuple(numbers)
+            ).fetchall()
+            told = [one for one in stamps if isinstance(one[1], int)]
+            places = set(set_back(told)) if len(told) == len(stamps) else set()
+            self.set_back |= bool(places)
+            order = "id" if places else "timestamp, id"
+            messages: Iterable[tuple[int, int, bytes]] = connection.execute(
+                f"SELECT topic_id, timestamp, data {of_topics} ORDER BY {order}", tuple(numbers)
+            )
+            if places:
+                # Without sorting, SQLite would find damage amid the messages.
+                messages = list(messages)
+            for place, (number, stamp, data) in enumerate(messages):
+                if place in places:
+                    yield GAP, stamp, b""
                 # A number or a text there is no message; `bytes` would make one of as many zeros.
                 usable = isinstance(data, bytes) and isinstance(stamp, int)
                 yield int(number), stamp if usable else 0, data if usable else b""

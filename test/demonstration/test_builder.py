@@ -54,6 +54,29 @@ def test_every_action_message_is_a_row_with_the_latest_state() -> None:
     assert builder.act(7, "action", "go") == (Row(7, "action", "go", "turn", (3.0,)),)
 
 
+def test_values_that_are_named_in_another_order_are_taken_by_their_names() -> None:
+    builder = one_topic()
+    builder.observe(1, "state", [1.0, 2.0], ["front", "left"])
+    builder.observe(2, "state", [4.0, 3.0], ["left", "front"])
+    assert builder.act(3, "action", "go")[0].state == (3.0, 4.0)
+    builder.observe(4, "state", [5.0, 6.0])
+    assert builder.act(5, "action", "go")[0].state == (5.0, 6.0)
+    with pytest.raises(BadMessageError, match="calls its values front, right") as caught:
+        builder.observe(6, "state", [7.0, 8.0], ["front", "right"])
+    assert caught.value.fault is Fault.NAMES
+    assert builder.act(7, "action", "go")[0].state == (5.0, 6.0)
+
+
+def test_names_that_somebody_gave_hold_whatever_messages_say() -> None:
+    builder = DemonstrationBuilder([StateTopic("state", ("a", "b"))], ["action"])
+    builder.observe(1, "state", [1.0, 2.0], ["b", "a"])
+    assert builder.act(2, "action", "go")[0].state == (1.0, 2.0)
+    single = one_topic()
+    single.observe(1, "state", [1.0], ["step 1"])
+    single.observe(2, "state", [2.0], ["step 2"])
+    assert single.act(3, "action", "go")[0].state == (2.0,)
+
+
 def test_an_empty_label_is_no_row_in_event_mode() -> None:
     builder = one_topic()
     builder.observe(1, "state", [1.0])

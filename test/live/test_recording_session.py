@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rebt_ros.demonstration.builder import StateTopic
+from rebt_ros.demonstration.builder import Fault, StateTopic
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError, RebtError
@@ -107,6 +107,42 @@ def test_states_before_the_start_are_known_and_actions_are_not() -> None:
     desk.session.act(4, "action", "go")
     assert desk.rows() == [[("go", None, (1.0,))]]
     assert desk.disk.files[0].features[0].name == "x"
+
+
+@pytest.mark.parametrize("sample_rate", [None, 1.0])
+def test_a_simulation_that_begins_anew_begins_a_demonstration(sample_rate: float | None) -> None:
+    second = 1_000_000_000
+    desk = Desk(sample_rate)
+    desk.session.start(0)
+    for run in range(2):
+        begin = 5 * second
+        desk.session.observe(begin, "state", [float(run)], ["x"] if run == 0 else [])
+        desk.session.act(begin + 1, "action", "go")
+        for step in range(3):
+            desk.session.observe(begin + step * second, "state", [float(run)], [])
+        desk.session.act(begin + 3 * second, "action", "turn")
+        if run == 0:
+            # What is known of the first run does not hold in the second.
+            desk.session.set_back(0)
+            desk.session.act(second, "action", "go")
+            assert Fault.NO_STATE.value in desk.faults
+    desk.session.stop(9 * second)
+    first, second_file = desk.disk.files
+    assert {row.state for row in first.written} == {(0.0,)}
+    assert {row.state for row in second_file.written} == {(1.0,)}
+    assert second_file.written[0].last_action is None
+    assert first.features == second_file.features
+    assert recording_session.SET_BACK in desk.faults
+
+
+def test_time_that_is_set_back_while_nothing_is_recorded_is_no_demonstration() -> None:
+    desk = desk_with_state()
+    desk.session.stop(2)
+    desk.session.set_back(0)
+    desk.session.observe(1, "state", [2.0], [])
+    desk.session.start(2)
+    desk.session.act(3, "action", "go")
+    assert desk.rows() == [[("go", None, (2.0,))]]
 
 
 def test_no_file_is_opened_without_a_row() -> None:

@@ -20,14 +20,13 @@ FEATURES = (
     Feature("room", FeatureKind.CATEGORICAL, ("1", "4"), topic="place", index=0),
 )
 
+_PROVENANCE = Provenance(1, 9, 0.0, 5, 0.0, Root.SELECTOR, History.LAST, Figures(0, None, None, 0))
+
 
 def _inputs(features: tuple[Feature, ...] = FEATURES) -> TreeInputs:
     tests = (Threshold("x", 0.5), HasCategory("room", "4"), LastActionIs("go", ("turn",)))
     tree = Selector((Sequence((*(Condition(Literal(one)) for one in tests), TURN)), GO))
-    provenance = Provenance(
-        1, 9, 0.0, 5, 0.0, Root.SELECTOR, History.LAST, Figures(0, None, None, 0)
-    )
-    return TreeInputs(LearnedTree(features, (GO, TURN), tree, provenance), "table", timeout=100)
+    return TreeInputs(LearnedTree(features, (GO, TURN), tree, _PROVENANCE), "table", timeout=100)
 
 
 def test_only_what_the_tree_tests_is_needed() -> None:
@@ -54,6 +53,38 @@ def test_features_of_a_table_come_in_their_order_on_the_default_topic() -> None:
     assert inputs.topics == ("table",)
     inputs.accept("table", Message((9.0, 0.25, 1.0), 0))
     assert list(inputs.state()[1:]) == [0.25, 0.0]
+
+
+def test_values_are_taken_by_the_names_that_messages_give_them() -> None:
+    inputs = _inputs()
+    inputs.accept("place", Message((1.0,), 0, ("other",)))
+    for names, values in (
+        ((), (0.0, 0.0, 0.25)),
+        (("a", "b", "c"), (0.0, 0.0, 0.25)),
+        (("a", "b", "x"), (0.0, 0.0, 0.25)),
+        (("x", "b", "a"), (0.25, 0.0, 0.0)),
+        (("b", "x"), (0.0, 0.25)),
+    ):
+        inputs.accept("pose", Message(values, 0, names))
+        assert inputs.state()[1] == 0.25
+    tests_two = TreeInputs(
+        LearnedTree(
+            (Feature("x", topic="pose", index=0), Feature("y", topic="pose", index=1)),
+            (GO, TURN),
+            Selector(
+                (Sequence((*(Condition(Literal(Threshold(one, 0.5))) for one in "xy"), TURN)), GO)
+            ),
+            _PROVENANCE,
+        ),
+        "table",
+        timeout=100,
+    )
+    wrong = Message((0.0, 0.0), 0, ("x", "z"))
+    with pytest.raises(BadMessageError, match="no value called 'y'") as caught:
+        tests_two.accept("pose", wrong)
+    assert caught.value.fault is Fault.NAMES
+    assert "no value called 'y'" in tests_two.misfit({"pose": wrong})
+    assert tests_two.misfit({"pose": Message((0.0, 0.0), 0, ("y", "x"))}) == ""
 
 
 @pytest.mark.parametrize(

@@ -163,6 +163,8 @@ def test_two_recorders_in_one_directory_do_not_mix_rows(
                 for name in (RECORDER, f"other/{RECORDER}")
             )
         )
+        for recorder in (one, other):
+            recorder.says(f"another recorder writes to {tmp_path}/demonstrations")
         assert (one.stop(), other.stop()) == (0, 0)
     reads = [read_recording(path) for path in recordings(tmp_path / "demonstrations")]
     shown = sorted((read.demonstration.actions, len(read.demonstration)) for read in reads)

@@ -128,6 +128,41 @@ def test_times_that_fall_are_sorted(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    "reader", ["mcap", "mcap without chunks", "split mcap", "sqlite", "split sqlite"]
+)
+def test_where_the_clock_was_set_back_messages_stay_in_their_order(
+    tmp_path: Path, reader: str
+) -> None:
+    second = 1_000_000_000
+    half = len(MESSAGES) // 2
+    again = [replace(one, stamp=(place % half + 5) * second) for place, one in enumerate(MESSAGES)]
+    bag = table.READERS[reader](tmp_path / "bag", table.Content(again))
+    read = read_bag(bag)
+    assert read.demonstration.states[:, 1].tolist() == [float(-number) for number in range(20)]
+    [note] = read.notes
+    assert note.startswith("the clock was set back")
+    assert read.account is not None
+    assert read.account.read == len(MESSAGES)
+    # No action is held on into the second run.
+    sampled = read_bag(bag, sample_rate=1.0).demonstration
+    assert len(sampled) <= len(MESSAGES)
+
+
+def test_topics_one_behind_the_other_and_single_late_messages_are_put_in_order(
+    tmp_path: Path,
+) -> None:
+    second = 1_000_000_000
+    spaced = [replace(one, stamp=one.stamp * second) for one in MESSAGES]
+    plain = read_bag(mcap.write(tmp_path / "plain.mcap", spaced))
+    apart = sorted(spaced, key=lambda one: one.channel)
+    late = [*spaced[:4], *spaced[5:15], spaced[4], *spaced[15:]]
+    for name, messages in (("apart", apart), ("late", late)):
+        read = read_bag(mcap.write(tmp_path / f"{name}.mcap", messages))
+        assert read.notes == ()
+        assert np.array_equal(read.demonstration.states, plain.demonstration.states)
+
+
 def test_text_that_is_not_utf8_and_other_encapsulations_are_unusable_messages(
     tmp_path: Path,
 ) -> None:

@@ -12,7 +12,7 @@ from rclpy.subscription import Subscription
 from std_msgs.msg import Float64MultiArray
 
 from rebt_ros.demonstration.builder import BadMessageError
-from rebt_ros.demonstration.fields import values_of
+from rebt_ros.demonstration.fields import names_of, values_of
 from rebt_ros.errors import DocumentError, RebtError
 from rebt_ros.live.tree_inputs import Message
 from rebt_ros.ros.diagnostics import Faults
@@ -114,9 +114,9 @@ class StateTopics:
             return self._robots[program].unheard
         return [topic for topic in program.inputs.topics if topic not in self._latest]
 
-    def too_short(self, program: TreeProgram) -> str:
-        """Which of the latest messages has too few values for a tree, in words; empty for none."""
-        return program.inputs.too_short(self._latest)
+    def misfit(self, program: TreeProgram) -> str:
+        """Which of the latest messages lacks values that a tree reads, in words; empty for none."""
+        return program.inputs.misfit(self._latest)
 
     def look(self) -> list[Finding]:
         """Looks at who publishes; see `RobotTopics.look`."""
@@ -130,7 +130,7 @@ class StateTopics:
         # A message may still come on a topic that no tree reads any longer.
         if topic not in self._plain:
             return
-        self._latest[topic] = Message(values_of(message), self._now())
+        self._latest[topic] = Message(values_of(message), self._now(), names_of(message))
         self._accept(topic)
         self._heard(topic, None)
 

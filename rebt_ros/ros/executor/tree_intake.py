@@ -102,10 +102,10 @@ class TreeIntake:
         if candidate is None:
             return
         if self._driving.program is not None:
-            short = self._topics.too_short(candidate)
-            if short:
+            misfit = self._topics.misfit(candidate)
+            if misfit:
                 self._discard_candidate()
-                self._refuse(f"{short}.")
+                self._refuse(f"{misfit}.")
                 self._follow()
                 return
             if self._topics.unheard(candidate):

@@ -7,6 +7,7 @@ import threading
 import time
 import traceback
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -38,6 +39,7 @@ from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
 from rebt_ros.ros.graph_watch import Finding, GraphWatch
 from rebt_ros.ros.learner.settings import declare_settings
 from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.shared_directory import SharedDirectory, Use
 from rebt_ros.storage.tree_file import find_tree
 from rebt_ros.storage.tree_versions import TreeVersions
 
@@ -84,6 +86,7 @@ class LearnerNode(Node):
         self._settings = declare_settings(self)
         self._ended = EndedDemonstrations()
         self._uncounted = ""
+        self._sharing = SharedDirectory(Use.TREES)
         self._count_ended()
         # On the second one an executor follows this learner, whoever else publishes trees.
         self._tree_publishers = [
@@ -119,6 +122,7 @@ class LearnerNode(Node):
 
     def close(self) -> None:
         """Waits for a tree that is being written."""
+        self._sharing.close()
         self._process.close()
         call = self._call
         if call is not None:
@@ -260,6 +264,17 @@ class LearnerNode(Node):
                 return f"rules_file {file} is not there, so that no tree is published"
         except (RebtError, OSError, ValueError) as err:
             return f"rules_file cannot be read ({err}), so that no tree is published"
+        return ""
+
+    def _shared(self) -> str:
+        """That another learner writes to the same directory, without a full stop; else empty."""
+        with suppress(RebtError):
+            output = self._settings.output()
+            if self._sharing.is_shared(output):
+                return (
+                    f"another learner keeps its trees in {output.absolute()} and replaces those of "
+                    "this one: stop it, or give each an output of its own"
+                )
         return ""
 
     def _keeping_rules(self, learned: LearnedTree) -> LearnedTree:
@@ -448,7 +463,8 @@ class LearnerNode(Node):
             "trees",
             "executors without a parameter 'learner' follow one by chance; stop all but one",
         )
-        unfit = [Finding(one, waits=False) for one in (self._uncounted, self._unruled()) if one]
+        said = (self._uncounted, self._unruled(), self._shared())
+        unfit = [Finding(one, waits=False) for one in said if one]
         problems = self._watch.say([*several, *unfit])
         if problems:
             return Report(Level.WARN, "; ".join((self._last.message, *problems)), values)

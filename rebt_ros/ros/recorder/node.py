@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -32,13 +32,14 @@ from rebt_ros.robot_file.features import FeatureReader, described
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.command_channels import DRIVING_QOS, topic_of
 from rebt_ros.ros.diagnostics import Diagnostics, Faults, Level, Report
-from rebt_ros.ros.graph_watch import GraphWatch
+from rebt_ros.ros.graph_watch import Finding, GraphWatch
 from rebt_ros.ros.node_clock import simulated_time
 from rebt_ros.ros.recorder.sending_time import SendingTime, received_at
 from rebt_ros.ros.recorder.settings import declare_settings
 from rebt_ros.ros.robot_files import RobotTopics
 from rebt_ros.storage.recording import RecordingWriter
 from rebt_ros.storage.recording_head import Origin
+from rebt_ros.storage.shared_directory import SharedDirectory, Use
 
 #: Long enough that no message of a burst is lost while the disk is slow.
 _QUEUE: Final = 5000
@@ -51,6 +52,9 @@ _LEAST_PERIOD: Final = 0.005
 
 #: Kind of the fault that an action came before there was a time for its row.
 _TIMELESS: Final = "action before the first /clock"
+
+#: Simulated time that falls by more begins anew (nanoseconds).
+_SET_BACK: Final = 100_000_000
 
 #: Time between two looks at who publishes (seconds).
 _LOOK_PERIOD: Final = 0.5
@@ -119,8 +123,10 @@ class RecorderNode(Node):
             topics += map(self.resolve_topic_name, settings.sources)
         self._sending = SendingTime(self, topics, settings.pair_by)
         self._watch = GraphWatch(self)
+        self._sharing = SharedDirectory(Use.RECORDINGS)
         self._ready = self.create_publisher(Bool, "~/ready", DRIVING_QOS)
         self._said_ready: bool | None = None
+        self._simulated = 0
         self._begin()
 
     def _begin(self) -> None:
@@ -158,11 +164,12 @@ class RecorderNode(Node):
 
     def close(self) -> None:
         """Writes what has been received, and ends the recording."""
+        self._sharing.close()
         self._take_waiting_messages()
         for take in self._order.flush(self._complete(time.monotonic_ns())):
             take()
-        # A signal has shut the context down, and the node's own logger publishes what it says.
-        logger = self.get_logger() if self.context.ok() else get_logger("rebt_ros")
+        # The node's own logger publishes what it says, and a signal shuts the context down.
+        logger = get_logger("rebt_ros")
         if self._order.held:
             logger.warning(
                 f"{self._order.held} actions are left out: the states that they belong to had not "
@@ -395,8 +402,19 @@ class RecorderNode(Node):
                 *watch.unheard(self._demonstrators),
                 *watch.mixed(plain),
                 *watch.misfits(self._driven),
+                *self._shared(),
             ]
         )
+
+    def _shared(self) -> Iterator[Finding]:
+        """That another recorder writes to the same directory."""
+        directory = self._settings.demonstrations
+        if self._sharing.is_shared(directory):
+            yield Finding(
+                f"another recorder writes to {directory.absolute()}: what both hear would be "
+                "learned from twice; stop it, or give each a directory of its own",
+                waits=False,
+            )
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any
@@ -464,7 +482,12 @@ class RecorderNode(Node):
     def _stamp(self, place: int) -> int:
         """What a row says: its action's place, or simulated time where that is in use."""
         simulated = simulated_time(self)
-        return place if simulated is None else simulated
+        if simulated is None:
+            return place
+        if simulated < self._simulated - _SET_BACK:
+            self._queue(place, partial(self._session.set_back, simulated))
+        self._simulated = simulated
+        return simulated
 
     def _count_losses(self) -> None:
         for topic, count in self._traffic.newly_lost(self.count_publishers).items():
