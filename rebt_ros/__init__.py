@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from rebt_ros.offline.result import OfflineLearning
     from rebt_ros.robot_file.robot_file import RobotFile
     from rebt_ros.storage.account import Account
-    from rebt_ros.storage.input_options import Aside, InputOptions, ReadingPlan
+    from rebt_ros.storage.input_options import Aside, InputOptions, ReadCounts, ReadingPlan
 
 __all__ = [
     "Account",
@@ -104,6 +104,7 @@ __all__ = [
     "Progress",
     "Provenance",
     "PsaChoice",
+    "ReadCounts",
     "ReadingPlan",
     "RebtError",
     "Reductions",
@@ -170,6 +171,7 @@ _HOMES = {
     "Progress": "rebt_ros.learning.progress",
     "Provenance": "rebt_ros.behavior_tree.learned_tree",
     "PsaChoice": "rebt_ros.learning.options",
+    "ReadCounts": "rebt_ros.storage.input_options",
     "ReadingPlan": "rebt_ros.storage.input_options",
     "RebtError": "rebt_ros.errors",
     "Reductions": "rebt_ros.beyond_the_paper.reductions",

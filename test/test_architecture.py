@@ -94,6 +94,7 @@ HOMES: Final = {
     "yaml": (
         "rebt_ros.robot_file.*",
         "rebt_ros.ros.parameter_files",
+        "rebt_ros.storage.bag_metadata",
         "rebt_ros.verification.rules_file",
     ),
     "zmq": ("rebt_ros.live.groot2_server",),

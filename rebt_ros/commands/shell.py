@@ -18,12 +18,15 @@ from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.errors import RebtError
 from rebt_ros.robot_file.reading import read_robot_file
 from rebt_ros.robot_file.robot_file import RobotFile
-from rebt_ros.storage.input_options import Aside, InputOptions, ReadingPlan
+from rebt_ros.storage.input_options import Aside, InputOptions, ReadCounts, ReadingPlan
 from rebt_ros.storage.read_cache import default_cache
 from rebt_ros.verification.robot_rules import rules_of
 
 #: Exit codes of a failure that the user can mend, and of Ctrl-C (128 + SIGINT).
 _FAILED, _INTERRUPTED = 1, 130
+
+#: So many inputs that are set aside are listed in the terminal.
+_LISTED = 20
 
 _Word = TypeVar("_Word", bound=Enum)
 
@@ -288,6 +291,7 @@ def input_options(
             strict=arguments.strict,
             progress=progress or ProgressBar(),
             tell=_tell,
+            tell_counts=_tell_counts,
         ),
     )
 
@@ -296,9 +300,23 @@ def _tell(aside: tuple[Aside, ...]) -> None:
     """Says what was set aside."""
     what = "1 input" if len(aside) == 1 else f"{len(aside)} inputs"
     print(f"set aside {what} that cannot be read (--strict refuses such):", file=sys.stderr)
-    for one in aside:
+    for one in aside[:_LISTED]:
         reason = "" if str(one.path) in one.reason else f"{one.path}: "
         print(f"  {reason}{one.reason}", file=sys.stderr)
+    if len(aside) > _LISTED:
+        more = len(aside) - _LISTED
+        print(f"  and {more} more: learn lists all of them in summary.json", file=sys.stderr)
+
+
+def _tell_counts(counts: ReadCounts) -> None:
+    """Says what was not read again, where several inputs were read before."""
+    if counts.cached > 1:
+        aside = f", {counts.aside} set aside" if counts.aside else ""
+        print(
+            f"{counts.cached + counts.read + counts.aside} inputs: {counts.cached} from the cache, "
+            f"{counts.read} read{aside}",
+            file=sys.stderr,
+        )
 
 
 def _state_topic(text: str) -> StateTopic:

@@ -176,7 +176,11 @@ class Feed:
             return ()
         name, kind = topic
         self.seen[name] += 1
-        self.earliest, self.latest = min(stamp, self.earliest), max(stamp, self.latest)
+        # Calls of min and max would take a tenth of the time that a message does.
+        if stamp < self.earliest:
+            self.earliest = stamp
+        if stamp > self.latest:
+            self.latest = stamp
         if name in self.there:
             self.unknown.discard(name)
         elif self.unknown:

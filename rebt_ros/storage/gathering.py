@@ -16,7 +16,6 @@ from rebt_ros.storage.read_cache import (
     ReadCache,
     is_kept,
     kept_bytes,
-    key_of,
     size_of,
     state_of,
 )
@@ -48,6 +47,8 @@ class Gathered:
     """Of each: what was read, or why it could not be."""
     unwritable: str = ""
     """Why the cache did not take something."""
+    cached: int = 0
+    """How many of them the cache had."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,8 @@ class _Fetched:
     """Why it cannot be read."""
     unwritable: str = ""
     """Why the cache does not take it."""
+    is_cached: bool = False
+    """Whether the cache had it."""
 
 
 def gather(sources: Sequence[Source], reading: Reading, options: InputOptions) -> Gathered:
@@ -79,7 +82,9 @@ def gather(sources: Sequence[Source], reading: Reading, options: InputOptions) -
     cache = None if plan.cache is None else ReadCache(plan.cache)
     keys = {}
     if cache is not None and plan.scheduler is None:
-        keys = {place: _key(source, reading, options) for place, source in enumerate(sources)}
+        keys = {
+            place: _key(source, reading, options, cache) for place, source in enumerate(sources)
+        }
     spool = Spool()
     answers: dict[int, Read | RebtError] = {}
     if cache is not None:
@@ -89,6 +94,7 @@ def gather(sources: Sequence[Source], reading: Reading, options: InputOptions) -
                 answers[place] = on_spool(read, spool)
     missing = [place for place in range(len(sources)) if place not in answers]
     apart = _for_workers(missing, sources, plan)
+    cached = len(answers)
     tell = _Telling(plan.progress, len(missing))
     reasons: list[str] = []
     try:
@@ -101,6 +107,7 @@ def gather(sources: Sequence[Source], reading: Reading, options: InputOptions) -
             answer = _taken(fetched, sources[fetched.place], options)
             answers[fetched.place] = on_spool(answer, spool) if isinstance(answer, Read) else answer
             reasons += filter(None, [fetched.unwritable])
+            cached += fetched.is_cached
             tell.one_more()
     finally:
         plan.progress("reading", 1.0)
@@ -108,7 +115,7 @@ def gather(sources: Sequence[Source], reading: Reading, options: InputOptions) -
     for answer in found:
         if isinstance(answer, RebtError) and (plan.strict or isinstance(answer, OptionError)):
             raise answer
-    return Gathered(found, min(reasons, default=""))
+    return Gathered(found, min(reasons, default=""), cached)
 
 
 def _check_workers(plan: ReadingPlan) -> None:
@@ -179,9 +186,9 @@ def _fetched(
     directory = options.plan.cache
     cache = None if directory is None else ReadCache(directory)
     if cache is not None and key is None:
-        key = _key(source, reading, options)
+        key = _key(source, reading, options, cache)
         if key and cache.get(key, source, options.robot) is not None:
-            return _Fetched(place, key)
+            return _Fetched(place, key, is_cached=True)
     reasons: list[str] = []
     try:
         read = _read_here(source, reading, options, key, cache, reasons)
@@ -233,10 +240,12 @@ def _elsewhere(plan: ReadingPlan) -> RebtError:
     )
 
 
-def _key(source: Source, reading: Reading, options: InputOptions) -> str:
+def _key(source: Source, reading: Reading, options: InputOptions, cache: ReadCache) -> str:
     """The key of an input in a cache; empty where it is not kept, or cannot be read."""
+    if not is_kept(source):
+        return ""
     try:
-        return key_of(source, reading.deciding(source.kind, options)) if is_kept(source) else ""
+        return cache.key_of(source, reading.deciding(source.kind, options))
     except OSError:
         return ""
 

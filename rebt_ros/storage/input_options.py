@@ -42,11 +42,27 @@ class Aside:
     """Why, as a sentence."""
 
 
+@dataclass(frozen=True, slots=True)
+class ReadCounts:
+    """Of how many inputs what they hold came from where."""
+
+    cached: int
+    """From the cache: these were read earlier."""
+    read: int
+    """From the inputs themselves."""
+    aside: int
+    """From nowhere: these cannot be read."""
+
+
 def _show_nothing(stage: str, share: float) -> None:
     pass
 
 
 def _tell_nobody(aside: tuple[Aside, ...]) -> None:
+    pass
+
+
+def _count_nothing(counts: ReadCounts) -> None:
     pass
 
 
@@ -67,6 +83,8 @@ class ReadingPlan:
     """Told what is being done and which share of the reading is behind."""
     tell: Callable[[tuple[Aside, ...]], None] = _tell_nobody
     """Told what was set aside, where something was."""
+    tell_counts: Callable[[ReadCounts], None] = _count_nothing
+    """Told where what the inputs hold came from, once all is there."""
 
 
 @dataclass(frozen=True, slots=True)

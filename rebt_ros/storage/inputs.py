@@ -16,7 +16,7 @@ from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.column_names import FEWEST_RISING
 from rebt_ros.storage.csv_table import read_csv
 from rebt_ros.storage.gathering import Gathered, Reading, gather
-from rebt_ros.storage.input_options import Aside, InputKind, InputOptions, Source
+from rebt_ros.storage.input_options import Aside, InputKind, InputOptions, ReadCounts, Source
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.recording import read_recording
 from rebt_ros.storage.recording_files import SUFFIX, is_recording
@@ -111,6 +111,7 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     ]
     if aside:
         options.plan.tell(aside)
+    options.plan.tell_counts(ReadCounts(gathered.cached, len(there) - gathered.cached, len(aside)))
     reads = _with_common_features([read for _, read in there])
     return Loaded(
         tuple(read.demonstration for read in reads),
@@ -163,7 +164,7 @@ def _gathered(sources: Sequence[Source], options: InputOptions) -> Gathered:
     second = gather([sources[place] for place in again], _READING, options)
     for place, one in zip(again, second.found, strict=True):
         found[place] = one
-    return Gathered(tuple(found), gathered.unwritable or second.unwritable)
+    return Gathered(tuple(found), gathered.unwritable or second.unwritable, gathered.cached)
 
 
 def _aside(

@@ -6,9 +6,12 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import secrets
-from collections.abc import Iterator
-from dataclasses import replace
+import stat
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -26,6 +29,12 @@ _DECIDING: Final = ("numpy", "rosbags")
 #: Where SQLite keeps what it has not yet written to a database, behind the name of the latter.
 _LOGS: Final = ("-wal", "-journal")
 _BLOCK: Final = 1 << 20
+#: Where the cache has the keys of inputs by the states of their files, each as a link that leads
+#: nowhere: a link of that length takes no room beside its name.
+_STATES: Final = "states"
+_KEY: Final = re.compile("[0-9a-f]{64}")
+#: Age of a change from which on another one has another time (nanoseconds): FAT's take 2 s.
+_SETTLED: Final = 3_000_000_000
 
 
 def default_cache() -> Path | None:
@@ -59,9 +68,7 @@ def key_of(source: Source, deciding: tuple[object, ...]) -> str:
         OSError: The input cannot be read.
     """
     digest = hashlib.sha256()
-    name = source.path.absolute().name
-    said = (source.kind.value, name, *_versions(), json.dumps(deciding, default=repr))
-    digest.update(repr(said).encode("utf-8", "surrogatepass"))
+    digest.update(repr(_said(source, deciding)).encode("utf-8", "surrogatepass"))
     for file in _files(source.path):
         called = os.fsencode(file.name)
         if not file.is_file():
@@ -75,14 +82,40 @@ def key_of(source: Source, deciding: tuple[object, ...]) -> str:
     return digest.hexdigest()
 
 
-def state_of(source: Source) -> tuple[tuple[str, int, int], ...]:
-    """Names, sizes and times of an input's files, which change where somebody writes to it.
+@dataclass(frozen=True, slots=True)
+class FileState:
+    """What changes where somebody writes to a file, or puts another one in its place."""
+
+    name: str
+    size: int
+    """Bytes."""
+    written: int
+    """When its content changed, as far as its owner says (nanoseconds)."""
+    changed: int
+    """When it or what is said of it changed, which nobody can set (nanoseconds)."""
+    number: int
+    """Of its inode, and of the device that has it."""
+    device: int
+    is_plain: bool
+    """Whether it is a file itself, no link to one."""
+
+
+def state_of(source: Source) -> tuple[FileState, ...]:
+    """The state of each of an input's files.
 
     Raises:
         OSError: It cannot be looked at.
     """
     return tuple(
-        (file.name, status.st_size, status.st_mtime_ns)
+        FileState(
+            file.name,
+            status.st_size,
+            status.st_mtime_ns,
+            status.st_ctime_ns,
+            status.st_ino,
+            status.st_dev,
+            stat.S_ISREG(status.st_mode),
+        )
         for file in _files(source.path)
         for status in (file.lstat(),)
     )
@@ -91,7 +124,7 @@ def state_of(source: Source) -> tuple[tuple[str, int, int], ...]:
 def size_of(source: Source) -> int:
     """Bytes that an input has; 0 where that is not known."""
     try:
-        return sum(size for _, size, _ in state_of(source))
+        return sum(one.size for one in state_of(source))
     except OSError:
         return 0
 
@@ -125,22 +158,66 @@ class ReadCache:
         path = self._path(key)
         path.parent.mkdir(parents=True, exist_ok=True)
         # The checksum tells what a loss of power leaves, so that nothing waits for the disk.
-        temporary = path.with_name(f".{key[:16]}.{os.getpid()}.{secrets.token_hex(4)}")
-        try:
-            temporary.write_bytes(content)
-            temporary.replace(path)
-        finally:
+        _replace(path, lambda temporary: temporary.write_bytes(content))
+
+    def key_of(self, source: Source, deciding: tuple[object, ...]) -> str:
+        """The key of an input, as `key_of` gives it, without reading one that is as it was.
+
+        Like git's index, the cache remembers the states of files whose content it has read: where
+        they are the same, down to the time of the last change, so is the content.  What was changed
+        a moment ago may be changed again at what the clock of files takes for the same time, so it
+        is not remembered yet.
+
+        Raises:
+            OSError: The input cannot be read.
+        """
+        state = state_of(source)
+        if not state or not all(one.is_plain for one in state):
+            return key_of(source, deciding)
+        said = (str(source.path.absolute()), state, *_said(source, deciding))
+        digest = hashlib.sha256(repr(said).encode("utf-8", "surrogatepass")).hexdigest()
+        link = self.directory / _STATES / digest[:2] / digest[2:]
+        with contextlib.suppress(OSError):
+            known = os.readlink(link)
+            if _KEY.fullmatch(known):
+                return known
+        key = key_of(source, deciding)
+        latest = max(max(one.written, one.changed) for one in state)
+        if time.time_ns() - latest > _SETTLED and state_of(source) == state:
             with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
+                link.parent.mkdir(parents=True, exist_ok=True)
+                _replace(link, lambda temporary: temporary.symlink_to(key))
+        return key
 
     def _path(self, key: str) -> Path:
         return self.directory / key[:2] / f"{key[2:]}{SUFFIX}"
+
+
+def _replace(path: Path, write: Callable[[Path], object]) -> None:
+    """Lets something be written beside a path and puts it there at once.
+
+    Raises:
+        OSError: That does not work.
+    """
+    temporary = path.with_name(f".{path.name[:16]}.{os.getpid()}.{secrets.token_hex(4)}")
+    try:
+        write(temporary)
+        temporary.replace(path)
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def kept_bytes(source: Source, read: Read) -> bytes:
     """What is kept of an input: with its path where notes name it, which then must be the same."""
     path = str(source.path)
     return packed(read, {"path": path} if any(path in note for note in read.notes) else None)
+
+
+def _said(source: Source, deciding: tuple[object, ...]) -> tuple[str, ...]:
+    """What decides about what is read, beside the content."""
+    name = source.path.absolute().name
+    return (source.kind.value, name, *_versions(), json.dumps(deciding, default=repr))
 
 
 @cache

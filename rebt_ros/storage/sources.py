@@ -259,6 +259,7 @@ def _kind_of(file: Path) -> InputKind:
 def _check_distinct(paths: Sequence[Path]) -> None:
     seen: set[Path] = set()
     for path in paths:
-        if path.resolve() in seen:
+        place = path.resolve()
+        if place in seen:
             raise InputError(f"{path} is given twice: name every demonstration once.")
-        seen.add(path.resolve())
+        seen.add(place)

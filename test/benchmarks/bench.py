@@ -39,6 +39,7 @@ ROWS: dict[str, Callable[[Settings], list[Figure]]] = {
     "relearn": learning.relearn,
     "relearn-large": learning.relearn_large,
     "relearn-again": relearning.one_more,
+    "relearn-live": relearning.among_nodes,
     "rest": node_rows.rest,
     "recorder": node_rows.recorder_cpu,
     "latency": node_rows.latency,

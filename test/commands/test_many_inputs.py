@@ -58,3 +58,20 @@ def test_the_tree_is_the_same_from_the_cache(tables: Path, tmp_path: Path) -> No
         learn.main([str(tables), "--out", str(tmp_path / name), "--cache", str(cache)])
     first, second = ((tmp_path / name / "tree.json").read_bytes() for name in ("first", "second"))
     assert first == second
+
+
+def test_what_was_read_before_is_counted_and_a_long_list_is_cut(
+    tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for number in range(24):
+        (tables / f"broken_{number}.csv").write_text("front,action\n")
+    out = tmp_path / "out"
+    arguments = [str(tables), "--out", str(out), "--cache", str(tmp_path / "cache")]
+    learn.main(arguments)
+    told = capsys.readouterr().err
+    assert told.count("broken_") == 19
+    assert "\n  and 5 more: learn lists all of them in summary.json\n" in told
+    assert len(json.loads((out / "summary.json").read_text())["set_aside"]) == 25
+    assert "from the cache" not in told
+    learn.main(arguments)
+    assert "\n27 inputs: 2 from the cache, 0 read, 25 set aside\n" in capsys.readouterr().err

@@ -17,6 +17,7 @@ from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.fields import Dimension, fields_of
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.storage.bag import STATE_TYPE, UndecodableError, _States, read_bag
+from rebt_ros.storage.bag_metadata import NAME, BagMetadata, read_metadata
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 STATE = "std_msgs/msg/Float64MultiArray"
@@ -299,6 +300,24 @@ def test_malformed_metadata_is_noted_in_one_sentence_and_done_without(tmp_path, 
     assert "metadata.yaml cannot be read" in note
     assert note.endswith("the bag is read without it")
     assert "\n" not in note
+
+
+@pytest.mark.parametrize("nothing", ["", "~", "null", "[]"])
+def test_metadata_are_read_as_other_writers_of_yaml_have_them(tmp_path, nothing):
+    (tmp_path / NAME).write_text(
+        """rosbag2_bagfile_information: {
+  "version": 9, relative_file_paths: ['a/2026-11-28', "on"],
+  topics_with_message_count: [
+    {topic_metadata: {name: /1e3, "type": std_msgs/msg/String}, message_count: "12"}]}
+"""
+    )
+    found = read_metadata(tmp_path)
+    assert found == BagMetadata(("2026-11-28", "on"), {("/1e3", "std_msgs/msg/String"): 12})
+    (tmp_path / NAME).write_text(
+        f"rosbag2_bagfile_information:\n  relative_file_paths: {nothing}\n"
+        f"  topics_with_message_count: {nothing}\n"
+    )
+    assert read_metadata(tmp_path) == BagMetadata()
 
 
 def test_what_is_no_bag_is_refused(tmp_path):

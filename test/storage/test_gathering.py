@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,7 @@ from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError, OptionError
-from rebt_ros.storage import gathering, inputs
+from rebt_ros.storage import gathering, inputs, read_cache
 from rebt_ros.storage.gathering import time_left
 from rebt_ros.storage.input_options import Aside, InputOptions, ReadingPlan, Source
 from rebt_ros.storage.inputs import Loaded, load
@@ -141,6 +143,77 @@ def test_only_what_is_new_or_different_is_read_again(
     readings.clear()
     load([tmp_path / "moved"], InputOptions(sample_rate=1e6, plan=options.plan))
     assert len(readings) == COUNT - 1
+
+
+@pytest.fixture
+def hashed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the inputs whose content is read for their keys, also of those written just now."""
+    names: list[str] = []
+    by_content = read_cache.key_of
+
+    def key_of(source: Source, deciding: tuple[object, ...]) -> str:
+        names.append(source.path.name)
+        return by_content(source, deciding)
+
+    monkeypatch.setattr(read_cache, "key_of", key_of)
+    monkeypatch.setattr(read_cache, "_SETTLED", -(1 << 62))
+    return names
+
+
+def test_the_content_of_what_nobody_touched_is_not_read_again(
+    fleet: Path, tmp_path: Path, readings: list[str], hashed: list[str]
+) -> None:
+    cache = tmp_path / "cache"
+    first = loaded(fleet, cache=cache)
+    assert len(hashed) == COUNT
+    hashed.clear()
+    readings.clear()
+    assert_equal(loaded(fleet, cache=cache), first)
+    assert (hashed, readings) == ([], ["run_3"])
+    # Of other options, other keys.
+    load([fleet / "run_1"], InputOptions(sample_rate=1e6, plan=ReadingPlan(cache=cache)))
+    assert hashed == ["run_1"]
+
+
+def test_content_that_was_changed_under_the_same_size_and_time_is_read_again(
+    fleet: Path, tmp_path: Path, readings: list[str], hashed: list[str]
+) -> None:
+    cache = tmp_path / "cache"
+    loaded(fleet, cache=cache)
+    file = fleet / "run_1" / "run_0.mcap"
+    status, shown = file.stat(), demonstration(11)
+    # What was done in the first two states, the other way round.
+    first, second = shown[1], shown[3]
+    shown[1], shown[3] = replace(first, data=second.data), replace(second, data=first.data)
+    write(file, shown)
+    assert file.stat().st_size == status.st_size
+    os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
+    readings.clear()
+    hashed.clear()
+    found = loaded(fleet, cache=cache)
+    assert (hashed, readings) == (["run_1"], ["run_1", "run_3"])
+    assert found.demonstrations[1].chosen[:2].tolist() == [1, 0]
+
+
+def test_what_was_written_just_now_is_not_taken_for_known(fleet: Path, tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    late = (time.time() + 3600) * 1e9
+    os.utime(fleet / "run_1" / "run_0.mcap", ns=(int(late), int(late)))
+    load([fleet / "run_1"], InputOptions(plan=ReadingPlan(cache=cache)))
+    assert not (cache / "states").exists()
+
+
+def test_what_is_said_of_states_and_makes_no_sense_is_not_believed(
+    fleet: Path, tmp_path: Path, hashed: list[str]
+) -> None:
+    cache = tmp_path / "cache"
+    options = InputOptions(plan=ReadingPlan(cache=cache))
+    load([fleet / "run_1"], options)
+    (link,) = (one for one in (cache / "states").rglob("*") if one.is_symlink())
+    for junk in ("../../etc/passwd", "f" * 64):
+        link.unlink()
+        link.symlink_to(junk)
+        assert [len(one) for one in load([fleet / "run_1"], options).demonstrations] == [11]
 
 
 def test_what_is_in_the_cache_and_damaged_is_read_again(

@@ -361,6 +361,16 @@ def test_deeply_nested_metadata_are_not_read(tmp_path: Path) -> None:
     without_metadata(bag, "deep nesting")
 
 
+@pytest.mark.parametrize(
+    "blocks",
+    ["- " * 400_000, "? " * 400_000, "".join(f"{' ' * depth}a:\n" for depth in range(900))],
+)
+def test_deeply_nested_blocks_of_metadata_are_not_read(tmp_path: Path, blocks: str) -> None:
+    bag = corpus.bag(tmp_path / "bag", MCAP, None)
+    (bag / METADATA).write_text(blocks)
+    without_metadata(bag, "deep nesting")
+
+
 def test_qos_is_not_read_whatever_stands_there(tmp_path: Path) -> None:
     bag = corpus.bag(tmp_path / "database", SQLITE, None)
     execute(bag, ("UPDATE topics SET offered_qos_profiles = ?", (NESTED,)))
