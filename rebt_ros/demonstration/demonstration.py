@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -93,9 +93,23 @@ class Demonstration:
         features: tuple[Feature, ...],
         rows: Iterable[Row],
         row_kind: RowKind = RowKind.EVENT,
+        values: Numbers | None = None,
     ) -> Demonstration:
-        """Gathers rows into columns, without keeping them."""
-        stamps, values = array("q"), array("d")
+        """Gathers rows into columns, without keeping them.
+
+        Args:
+            name: What it is called.
+            features: Of its states.
+            rows: Its rows.
+            row_kind: What they are.
+            values: Where the states go, which holds nothing yet; None for memory.
+
+        Raises:
+            InputError: There is no room for them.
+        """
+        stamps = array("q")
+        if values is None:
+            values = _InMemory()
         actions = _Codes()
         channels = _Codes()
         for row in rows:
@@ -106,12 +120,33 @@ class Demonstration:
         return cls(
             name,
             features,
-            np.frombuffer(values).reshape(len(stamps), len(features)),
+            values.values().reshape(len(stamps), len(features)),
             np.frombuffer(stamps, dtype=np.int64),
             *actions.sorted(),
             *channels.sorted(),
             row_kind=row_kind,
         )
+
+
+class Numbers(Protocol):
+    """Takes numbers that come one after the other."""
+
+    def extend(self, values: Iterable[float], /) -> None:
+        """Adds numbers."""
+
+    def values(self) -> FloatArray:
+        """All of them, once nothing more comes: shape (numbers,)."""
+
+
+class _InMemory:
+    """The plain way to do so."""
+
+    def __init__(self) -> None:
+        self._values = array("d")
+        self.extend = self._values.extend
+
+    def values(self) -> FloatArray:
+        return np.frombuffer(self._values)
 
 
 class _Codes:

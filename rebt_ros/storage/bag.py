@@ -22,6 +22,7 @@ from rebt_ros.arrays import FloatArray
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, Fault, StateTopic
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.fields import ArrayMessage, names_of, values_of
+from rebt_ros.demonstration.large_arrays import GrowingArray
 from rebt_ros.errors import InputError, printable
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.bag_files import GAP, BagFiles, Message, Topic, explained, opened_bag
@@ -153,6 +154,7 @@ class Feed:
             self.builder.features,
             chain((first,), rows),
             RowKind.EVENT if sample_rate is None else RowKind.SAMPLE,
+            GrowingArray(),
         )
 
     def read(self, bag: BagFiles, wanted: set[Topic], demonstration: Demonstration) -> Read:

@@ -12,14 +12,14 @@ import json
 import mmap
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rebt_ros.arrays import IntArray
+from rebt_ros.arrays import IntArray, in_parts
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.storage.account import Account
@@ -37,8 +37,8 @@ class NoColumnFileError(Exception):
     """The bytes are not those of a whole column file."""
 
 
-def packed(read: Read, words: Mapping[str, Any] | None = None) -> bytes:
-    """The bytes of a column file.
+def packed(read: Read, words: Mapping[str, Any] | None = None) -> Iterator[bytes]:
+    """The bytes of a column file, part by part: states that are on disk stay there.
 
     Args:
         read: What was read; its robot file is left out, and only that there is one is noted.
@@ -46,16 +46,15 @@ def packed(read: Read, words: Mapping[str, Any] | None = None) -> bytes:
     """
     shown = read.demonstration
     columns: dict[str, NDArray[Any]] = {
-        "states": np.ascontiguousarray(shown.states, dtype="<f8"),
+        "states": shown.states,
         "stamps": np.ascontiguousarray(shown.stamps, dtype="<i8"),
         "chosen": _narrow(shown.chosen, len(shown.actions)),
         "channel": _narrow(shown.channel, len(shown.channels)),
     }
-    content, places = bytearray(), {}
+    place, places = 0, {}
     for name, column in columns.items():
-        places[name] = [len(content), column.dtype.str]
-        content += column.tobytes()
-        content += bytes(-len(content) % _ALIGNED)
+        places[name] = [place, "<f8" if name == "states" else column.dtype.str]
+        place += column.nbytes + -column.nbytes % _ALIGNED
     said = {
         "name": shown.name,
         "features": [_feature_json(feature) for feature in shown.features],
@@ -73,8 +72,20 @@ def packed(read: Read, words: Mapping[str, Any] | None = None) -> bytes:
     }
     text = json.dumps(said, ensure_ascii=False).encode("utf-8", "surrogatepass")
     text += b" " * (-(_HEAD.size + len(text)) % _ALIGNED)
-    check = zlib.crc32(content, zlib.crc32(text))
-    return _HEAD.pack(_MAGIC, check, len(text)) + text + content
+    check = zlib.crc32(text)
+    for part in _content(columns.values()):
+        check = zlib.crc32(part, check)
+    yield _HEAD.pack(_MAGIC, check, len(text)) + text
+    yield from _content(columns.values())
+
+
+def _content(columns: Iterable[NDArray[Any]]) -> Iterator[bytes]:
+    """The bytes of columns, each filled up to where the next one may begin."""
+    for column in columns:
+        for part in in_parts(len(column)):
+            values = column[part]
+            yield (values.astype("<f8", copy=False) if values.ndim > 1 else values).tobytes()
+        yield bytes(-column.nbytes % _ALIGNED)
 
 
 def unpacked_read(content: bytes | mmap.mmap) -> tuple[Read, dict[str, Any], bool]:

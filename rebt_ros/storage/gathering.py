@@ -201,7 +201,8 @@ def _fetched(
         and cache.get(key, source, options.robot) is not None
     ):
         return _Fetched(place, key)
-    return _Fetched(place, content=kept_bytes(source, read), unwritable="".join(reasons[:1]))
+    content = b"".join(kept_bytes(source, read))
+    return _Fetched(place, content=content, unwritable="".join(reasons[:1]))
 
 
 def _plain(error: RebtError) -> RebtError:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from rebt_ros.arrays import IntArray
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.large_arrays import Spool
 from rebt_ros.robot_file.robot_file import RobotFile
@@ -26,13 +29,20 @@ class Read:
 
 
 def on_spool(read: Read, spool: Spool) -> Read:
-    """The same, with states that leave the memory once there are many.
+    """The same, with columns that leave the memory once there are many.
 
     Raises:
         InputError: There is no room for them on disk.
     """
     shown = read.demonstration
     states = spool.take(shown.states)
-    if states is shown.states:
-        return read
-    return replace(read, demonstration=replace(shown, states=states))
+    # What is a view of a file's bytes would keep all of them in memory.
+    stamps, chosen, channel = (
+        _taken(column, spool) for column in (shown.stamps, shown.chosen, shown.channel)
+    )
+    columns = replace(shown, states=states, stamps=stamps, chosen=chosen, channel=channel)
+    return replace(read, demonstration=columns)
+
+
+def _taken(column: IntArray, spool: Spool) -> IntArray:
+    return spool.take(np.ascontiguousarray(column, dtype=np.int64).view(np.float64)).view(np.int64)

@@ -10,7 +10,7 @@ import re
 import secrets
 import stat
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -149,7 +149,7 @@ class ReadCache:
             return None
         return replace(read, robot=robot) if has_robot else read
 
-    def put(self, key: str, content: bytes) -> None:
+    def put(self, key: str, content: Iterable[bytes]) -> None:
         """Keeps the bytes that `kept_bytes` gives; another process sees all of them or nothing.
 
         Raises:
@@ -157,8 +157,13 @@ class ReadCache:
         """
         path = self._path(key)
         path.parent.mkdir(parents=True, exist_ok=True)
+
         # The checksum tells what a loss of power leaves, so that nothing waits for the disk.
-        _replace(path, lambda temporary: temporary.write_bytes(content))
+        def write(temporary: Path) -> None:
+            with temporary.open("wb") as file:
+                file.writelines(content)
+
+        _replace(path, write)
 
     def key_of(self, source: Source, deciding: tuple[object, ...]) -> str:
         """The key of an input, as `key_of` gives it, without reading one that is as it was.
@@ -208,8 +213,11 @@ def _replace(path: Path, write: Callable[[Path], object]) -> None:
             temporary.unlink(missing_ok=True)
 
 
-def kept_bytes(source: Source, read: Read) -> bytes:
-    """What is kept of an input: with its path where notes name it, which then must be the same."""
+def kept_bytes(source: Source, read: Read) -> Iterator[bytes]:
+    """What is kept of an input, part by part.
+
+    Where notes name its path, that is kept as well, and must be the same then.
+    """
     path = str(source.path)
     return packed(read, {"path": path} if any(path in note for note in read.notes) else None)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,13 @@ import pytest
 from rebt_ros import arrays
 from rebt_ros.arrays import FloatArray
 from rebt_ros.demonstration import large_arrays
-from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.demonstration.demonstration import Demonstration, Row
 from rebt_ros.demonstration.lags import with_lags
-from rebt_ros.demonstration.large_arrays import Spool, is_mapped, roomy, rows_of
+from rebt_ros.demonstration.large_arrays import GrowingArray, Spool, is_mapped, roomy, rows_of
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError
+from rebt_ros.storage.read import Read, on_spool
 
 LARGE = 80 * 24
 
@@ -78,6 +80,40 @@ def test_what_is_spooled_leaves_the_memory_once_it_is_much(on_disk: Path) -> Non
     # What is on disk already is not copied.
     assert spool.take(taken[2]) is taken[2]
     assert not list(on_disk.iterdir())
+
+
+def test_all_columns_of_what_was_read_are_spooled_to_the_bit(on_disk: Path) -> None:
+    stamps = np.array([0, -1, 2**63 - 1, -(2**63), 0x7FF8_0000_0000_0001] * 20)
+    shown = replace(_demonstration(0, 100), stamps=stamps)
+    spooled = on_spool(Read(shown), Spool()).demonstration
+    for name in ("states", "stamps", "chosen", "channel"):
+        column = getattr(spooled, name)
+        assert is_mapped(column) is (name in ("states", "channel"))
+        assert column.tobytes() == getattr(shown, name).tobytes()
+    spool = Spool()
+    spool.take(np.empty(LARGE // 8 - 1))
+    for name in ("states", "stamps", "chosen", "channel"):
+        column = getattr(on_spool(Read(shown), spool).demonstration, name)
+        assert is_mapped(column)
+        assert column.dtype == getattr(shown, name).dtype
+        assert column.tobytes() == getattr(shown, name).tobytes()
+
+
+def test_rows_that_come_one_by_one_leave_the_memory_once_they_are_many(
+    monkeypatch: pytest.MonkeyPatch, on_disk: Path
+) -> None:
+    monkeypatch.setattr(large_arrays, "_PASSING", 7)
+    for count in (1, 79, 80, 81, 83, 200):
+        states = np.random.default_rng(count).normal(size=(count, 3)).tolist()
+        rows = (Row(number, "action", "go", None, tuple(one)) for number, one in enumerate(states))
+        features = tuple(map(Feature, "abc"))
+        shown = Demonstration.from_rows("d", features, rows, values=GrowingArray())
+        assert is_mapped(shown.states) is (count >= 80)
+        assert shown.states.tolist() == states
+    assert not list(on_disk.iterdir())
+    monkeypatch.setenv("TMPDIR", str(on_disk / "nowhere"))
+    with pytest.raises(InputError, match=r"there is no room for 0\.0 GB of states in .*nowhere"):
+        GrowingArray().extend(range(LARGE))
 
 
 def test_tables_and_their_parts_are_the_same_on_disk(

@@ -83,7 +83,7 @@ def assert_same(one: Read, other: Read) -> None:
 @settings(max_examples=25)
 @given(_reads())
 def test_what_was_read_comes_back_to_the_bit(read: Read) -> None:
-    found, words, has_robot = unpacked_read(packed(read, {"path": "x"}))
+    found, words, has_robot = unpacked_read(b"".join(packed(read, {"path": "x"})))
     assert_same(found, read)
     assert (words, has_robot) == ({"path": "x"}, False)
 
@@ -91,7 +91,7 @@ def test_what_was_read_comes_back_to_the_bit(read: Read) -> None:
 @settings(max_examples=25)
 @given(_reads(), st.data())
 def test_a_file_that_is_cut_or_changed_in_one_byte_is_none(read: Read, data: st.DataObject) -> None:
-    content = packed(read)
+    content = b"".join(packed(read))
     place = data.draw(st.integers(0, len(content) - 1))
     other = bytearray(content)
     other[place] ^= data.draw(st.integers(1, 255))
@@ -106,7 +106,7 @@ def test_a_large_file_is_mapped_and_says_the_same(
     row = Row(1, "action", "go", None, (0.5, np.pi))
     shown = Demonstration.from_rows("one", (Feature("x"), Feature("y")), [row])
     path = tmp_path / "one"
-    path.write_bytes(packed(Read(shown)))
+    path.write_bytes(b"".join(packed(Read(shown))))
     small, _, _ = read_columns(path)
     monkeypatch.setattr(column_file, "_MAPPED", 1)
     mapped, _, _ = read_columns(path)
