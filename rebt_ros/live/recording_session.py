@@ -23,6 +23,12 @@ WRITE_ERROR = "write error"
 #: Kind of the fault that simulated time was set back.
 SET_BACK = "simulated time set back"
 
+#: What is said where a demonstration without rows ends.
+NO_ROWS = "no rows were recorded."
+
+#: Before the topics that a recorder waits for in vain.
+NOT_HEARD = "Not heard so far:"
+
 #: Pause between attempts to open a file where writing failed (seconds).
 _RETRY_AFTER = 1.0
 
@@ -124,6 +130,9 @@ class RecordingSession:
         self._writer: Writer | None = None
         # The demonstration that ended last, as long as it may be meant to be thrown away.
         self._ended: _Ended | None = None
+        # What was recorded of a takeover that ended because the executor drove on, until a person
+        # ends it, too.
+        self._handed_back = ""
         self._retry_at = -math.inf
         self.origin = Origin.DEMONSTRATION
         """Why the demonstration under way, or the one that ended last, is or was shown."""
@@ -208,6 +217,7 @@ class RecordingSession:
         # States were not taken since they were added last.
         self._recent.clear()
         self._ended = None
+        self._handed_back = ""
         self._begin(stamp)
         return Answer(True, "recording: the demonstration's file is opened at its first action.")
 
@@ -218,16 +228,24 @@ class RecordingSession:
         ended = self._end(stamp)
         self._builder = None
         self.awaited = False
+        self._handed_back = ""
         if not ended.success and not self.failure and self.rows:
             rows = _count(self.rows)
             return Answer(True, f"stopped; no rows since the last demonstration, {rows} in all.")
         return Answer(ended.success, f"stopped; {ended.message}")
 
     def renew(self, stamp: int) -> Answer:
-        """Ends the demonstration and begins the next one."""
+        """Ends the demonstration and begins the next one.
+
+        A takeover that has ended already, since the executor drives on, is meant where no row came
+        after it.
+        """
         if not self.recording:
             return Answer(False, "not recording: call ~/record with true first.")
         ended = self._end(stamp)
+        if ended.message == NO_ROWS and self._handed_back:
+            ended = Answer(True, f"the takeover is kept: {self._handed_back}")
+        self._handed_back = ""
         self.awaited = False
         self._begin(stamp)
         return Answer(ended.success, f"{ended.message} A new demonstration has begun.")
@@ -239,6 +257,7 @@ class RecordingSession:
         aside, so that it is not learned from.
         """
         self.failed += 1
+        self._handed_back = ""
         taken_over = self.recording and self.origin is Origin.TAKEOVER
         if self.recording:
             ended = self._end(stamp, aside=taken_over)
@@ -272,6 +291,7 @@ class RecordingSession:
                 else "a demonstration that has ended is a file"
             )
             return Answer(False, f"not recording: {which} that you can delete.")
+        self._handed_back = ""
         ended, self._ended = self._ended, None
         writer, self._writer = self._writer, None
         origin = self.origin
@@ -328,7 +348,10 @@ class RecordingSession:
     def _hand_over(self, stamp: int) -> None:
         """The executor drives from now on: no action is held by a person any more."""
         if self.recording:
-            self._end(stamp)
+            shown = self._writer is not None and self.origin is not Origin.DEMONSTRATION
+            ended = self._end(stamp)
+            if shown and ended.success:
+                self._handed_back = ended.message
         self._held.clear()
         if self.recording:
             self._begin(stamp, Origin.FAILED if self.awaited else Origin.DEMONSTRATION)
@@ -368,7 +391,7 @@ class RecordingSession:
         writer, self._writer = self._writer, None
         if writer is None:
             # Nobody has to show what failed, nor what a tree does.
-            return Answer(self.awaited or self.origin is Origin.TAKEOVER, "no rows were recorded.")
+            return Answer(self.awaited or self.origin is Origin.TAKEOVER, NO_ROWS)
         try:
             writer.set_aside() if aside else writer.close()
         except RebtError as err:

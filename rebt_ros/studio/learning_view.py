@@ -8,15 +8,17 @@ from typing import Final
 
 import numpy as np
 
-from rebt_ros.behavior_tree import nodes
+from rebt_ros.arrays import FloatArray
+from rebt_ros.behavior_tree import nodes, paths
+from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.wording import Wording, summary
-from rebt_ros.demonstration.schema import FeatureKind
+from rebt_ros.behavior_tree.wording import Wording, quantity_text, summary
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.learning import evaluation
 from rebt_ros.learning.learning import Learning
+from rebt_ros.logic.conditions import Interval, Literal, Quantity, Threshold
 from rebt_ros.studio.tree_view import Json, suggestion_views, tree_view
 from rebt_ros.trial.tally import Tally
 from rebt_ros.verification.contradictions import agreeing_demands
@@ -170,26 +172,66 @@ def rules_view(learning: Learning, rules: RuleSet | None) -> list[dict[str, Json
     ]
 
 
-def histogram(learning: Learning, feature: str) -> dict[str, Json]:
-    """How often each action was shown, over the values of a numeric feature.
+def histogram(learning: Learning, path: str) -> dict[str, Json]:
+    """How often each action was shown, over the values of what a condition compares.
+
+    Args:
+        learning: The policy.
+        path: Of the condition in its tree.
+
+    Returns:
+        ``quantity`` (a feature, or what is computed from several, in words), ``edges`` of the bars,
+        and ``counts`` of rows in each bar, by action.
 
     Raises:
-        OptionError: There is no such feature, or it has no numbers.
+        OptionError: There is no such condition, or it compares no number.
     """
+    quantity = _compared(learning, path)
+    words = quantity_text(quantity)
     table = learning.table
-    place = next((i for i, one in enumerate(table.features) if one.name == feature), None)
-    if place is None or table.features[place].kind is not FeatureKind.NUMERIC:
-        raise OptionError(f"there is no numeric feature {feature!r}.")
-    values = table.states[:, place]
+    # A value that is missing is NaN, and infinities may cancel out.
+    with np.errstate(invalid="ignore", over="ignore"):
+        values = StateTests(table.features).reading(quantity)(table.states.T)
     known = np.isfinite(values)
-    if not known.any():
-        raise OptionError(f"{feature!r} was never known.")
-    edges = np.histogram_bin_edges(values[known], bins=_BARS)
+    edges = bar_edges(values[known], words)
     counts = {
         label: np.histogram(values[known & (table.chosen == code)], edges)[0].tolist()
         for code, label in enumerate(table.actions)
     }
-    return {"edges": edges.tolist(), "counts": counts}
+    return {"quantity": words, "edges": edges.tolist(), "counts": counts}
+
+
+def bar_edges(values: FloatArray, words: str) -> FloatArray:
+    """The edges of the bars of a histogram.
+
+    Args:
+        values: Finite numbers.
+        words: What they are of.
+
+    Raises:
+        OptionError: There are none, or no bars hold them.
+    """
+    if not values.size:
+        raise OptionError(f"{words} was never known.")
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.histogram_bin_edges(values, bins=_BARS)
+    except ValueError as err:
+        # They lie too close together, or too far apart, for floating-point numbers between them.
+        raise OptionError(f"there is no histogram of {words}: {str(err).rstrip('.')}.") from err
+
+
+def _compared(learning: Learning, path: str) -> Quantity:
+    """What the condition at a path compares with a number."""
+    try:
+        node = paths.node_at(learning.learned.tree, paths.path_of(path))
+    except LookupError as err:
+        raise OptionError(f"{err}: the tree has changed since; try again.") from err
+    match node:
+        case nodes.Condition(literal=Literal(condition=Threshold() | Interval() as condition)):
+            return condition.quantity
+        case _:
+            raise OptionError(f"the node at {path} compares no number.")
 
 
 def _branches(learned: LearnedTree) -> tuple[str, ...]:

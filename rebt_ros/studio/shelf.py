@@ -7,6 +7,7 @@ name, which `recordings` passes over, and the files of what was deleted go after
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -106,14 +107,22 @@ class Shelf:
         return f"{name} is deleted; for {UNDO_TIME / 60:.0f} minutes it can be had back."
 
     def restore(self, name: str) -> str:
-        """Takes a deletion back.
+        """Takes a deletion back, or the cuts that made parts of a demonstration.
+
+        Its parts go: all that is in them is in the whole one, and nothing is learned from twice.
 
         Raises:
             OptionError: There is none of this name.
-            StorageError: Its file cannot be renamed.
+            StorageError: Its file cannot be renamed, or a part cannot be removed.
         """
         self._rename(name, DELETED, "")
-        return f"{name} is back."
+        parts = [path for path, _ in self._files() if self._is_part(path, name)]
+        for part in parts:
+            try:
+                part.unlink(missing_ok=True)
+            except OSError as err:
+                raise StorageError(f"{part} cannot be removed ({err.strerror}).") from err
+        return f"{name} is {'whole again' if parts else 'back'}."
 
     def trim(self, name: str, first: float, end: float) -> str:
         """Keeps a stretch of a demonstration, as one of its own; the whole one is deleted.
@@ -183,6 +192,17 @@ class Shelf:
             raise
         self._rename(name, "", DELETED)
 
+    def _is_part(self, path: Path, name: str) -> bool:
+        """Whether a file is a part that `_cut` has made of a demonstration, or of a part of it."""
+        if not re.fullmatch(rf"{re.escape(name)}(-[12])+", _name(path)):
+            return False
+        try:
+            whole = read_recording(self.directory / f"{name}{SUFFIX}").demonstration
+            part = read_recording(path).demonstration
+        except RebtError:
+            return False
+        return _holds(whole, part)
+
     def _path(self, name: str, suffix: str) -> Path:
         """The file of a demonstration: a name comes from a browser, and may not lead elsewhere."""
         path = self.directory / f"{name}{SUFFIX}{suffix}"
@@ -213,6 +233,20 @@ class Shelf:
             known = (mark, _content(path) if is_recording(path) else None)
             self._known[path] = known
         return known[1]
+
+
+def _holds(whole: Demonstration, part: Demonstration) -> bool:
+    """Whether all rows of a part are in the whole one, with nothing in between."""
+    if whole.features != part.features or not len(part):
+        return False
+    first = int(np.searchsorted(whole.stamps, part.stamps[0]))
+    rows = slice(first, first + len(part))
+    return (
+        np.array_equal(whole.stamps[rows], part.stamps)
+        and np.array_equal(whole.states[rows], part.states, equal_nan=True)
+        and [whole.actions[code] for code in whole.chosen[rows]]
+        == [part.actions[code] for code in part.chosen]
+    )
 
 
 def _name(path: Path) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 from rebt_ros.behavior_tree import nodes, paths
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.shown import Span
-from rebt_ros.behavior_tree.wording import Kind, Wording, heading, summary
+from rebt_ros.behavior_tree.wording import Kind, Wording, heading, quantity_text, summary
 from rebt_ros.drawing.shapes import Line, Node
 from rebt_ros.drawing.tree_picture import drawn_tree
 from rebt_ros.logic.conditions import (
@@ -151,6 +151,7 @@ def _quantity(quantity: Quantity, spans: Mapping[str, Span]) -> dict[str, Json]:
         low, high = low + min(ends), high + max(ends)
     known = not math.isnan(low)
     return {
+        "quantity": quantity_text(quantity),
         "terms": [list(term) for term in quantity.terms],
         "low": low if known else None,
         "high": high if known else None,

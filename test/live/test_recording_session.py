@@ -443,6 +443,29 @@ def test_a_takeover_without_rows_leaves_nothing_to_set_aside() -> None:
     assert answer.message.startswith("no rows were recorded. Now disable the executor,")
 
 
+def test_who_ends_a_takeover_after_the_executor_drives_on_is_told_that_it_is_kept() -> None:
+    desk = desk_with_state()
+    desk.session.drive(2, True)
+    desk.session.act(3, "action", "stop")
+    desk.session.drive(4, True)
+    assert desk.actions() == [(TAKEOVER, ["stop"], "closed")]
+    answer = desk.session.renew(5)
+    assert answer.success
+    assert answer.message == (
+        "the takeover is kept: recorded 1 row in file. A new demonstration has begun."
+    )
+    # It is meant once, and not where something came after it.
+    assert desk.session.renew(6) == (
+        False,
+        "no rows were recorded. A new demonstration has begun.",
+    )
+    desk.session.drive(7, True)
+    desk.session.act(8, "action", "turn")
+    desk.session.drive(9, True)
+    desk.session.discard(10)
+    assert not desk.session.renew(11).success
+
+
 def test_what_failed_twice_is_awaited_still_and_what_was_shown_is_kept() -> None:
     desk = desk_with_state()
     assert desk.session.fail(2).success

@@ -9,7 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from selenium.common.exceptions import StaleElementReferenceException, WebDriverException
+from selenium.common.exceptions import (
+    StaleElementReferenceException,
+    TimeoutException,
+    WebDriverException,
+)
 from selenium.webdriver import ActionChains, Chrome, ChromeOptions
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
@@ -70,10 +74,14 @@ class Browser:
         """Runs a script in the page."""
         return self.driver.execute_script(script, *given)
 
-    def until(self, condition: Callable[[], Any], what: str = "") -> Any:
+    def until(self, condition: Callable[[], Any], what: str | Callable[[], str] = "") -> Any:
         """Waits until a condition holds and returns its value.
 
         Elements that went meanwhile make it look again.
+
+        Args:
+            condition: Is looked at again and again.
+            what: What to say if it never holds; looked at then.
         """
 
         def look(_: object) -> Any:
@@ -82,7 +90,10 @@ class Browser:
             except StaleElementReferenceException:
                 return None
 
-        return WebDriverWait(self.driver, PATIENCE, 0.05).until(look, what)
+        try:
+            return WebDriverWait(self.driver, PATIENCE, 0.05).until(look)
+        except TimeoutException as err:
+            raise TimeoutException(what if isinstance(what, str) else what()) from err
 
     def all(self, selector: str) -> list[WebElement]:
         """All elements of a CSS selector."""
@@ -103,7 +114,7 @@ class Browser:
         """Waits until a text can be seen in an element."""
         self.until(
             lambda: words in self.one(selector).text,
-            f"{words!r} is not in {selector}, which says {self._said(selector)!r}",
+            lambda: f"{words!r} is not in {selector}, which says {self._said(selector)}",
         )
 
     def press(self, selector: str, words: str = "") -> None:
@@ -184,7 +195,9 @@ class Browser:
         return True
 
     def _said(self, selector: str) -> str:
-        return json.dumps([found.text[:500] for found in self.all(selector)])
+        said = """return [...document.querySelectorAll(arguments[0])]
+            .map(one => (one.innerText ?? one.textContent).slice(0, 500))"""
+        return json.dumps(self.run(said, selector))
 
 
 def _tried(act: Callable[[], bool]) -> bool:

@@ -13,11 +13,12 @@ from typing import Any, Final
 
 import strategies as some
 
-from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree import nodes, paths
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, Suggestion, SuggestionKind
 from rebt_ros.behavior_tree.shown import ShownChannel, ShownLeaf, Span
+from rebt_ros.behavior_tree.wording import quantity_text
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.logic.conditions import Interval, IsTrue, Literal, Threshold
+from rebt_ros.logic.conditions import Interval, IsTrue, Literal, Quantity, Threshold
 from rebt_ros.ros.studio.server import Server
 from rebt_ros.studio.board import Board, Section
 from rebt_ros.studio.tree_view import published_view, suggestion_views, tree_view
@@ -340,7 +341,7 @@ def fill(pretend: Pretend) -> LearnedTree:
     )
     pretend.answers |= {
         "explain": lambda _: ("then", explanation()),
-        "histogram": lambda asked: ("", histogram(asked["feature"])),
+        "histogram": lambda asked: ("", histogram(learned, asked["path"])),
         "moment": lambda asked: (
             "then",
             {
@@ -372,15 +373,26 @@ def explanation() -> dict[str, Any]:
     }
 
 
-def histogram(feature: str) -> dict[str, Any]:
-    """Rows of each action over the values of a feature."""
-    low, high = RANGES[feature]
+def histogram(learned: LearnedTree, path: str) -> dict[str, Any]:
+    """Rows of each action over the values of what a condition compares."""
+    node = paths.node_at(learned.tree, paths.path_of(path))
+    assert isinstance(node, nodes.Condition)
+    assert isinstance(node.literal.condition, Threshold | Interval)
+    quantity = node.literal.condition.quantity
+    low, high = _range(quantity)
     edges = [low + (high - low) * place / 30 for place in range(31)]
     counts = {
         label: [round(60 * math.exp(-(((bin_ - 5 - 6 * place) / 4) ** 2))) for bin_ in range(30)]
         for place, label in enumerate(LABELS)
     }
-    return {"edges": edges, "counts": counts}
+    return {"quantity": quantity_text(quantity), "edges": edges, "counts": counts}
+
+
+def _range(quantity: Quantity) -> tuple[float, float]:
+    if isinstance(quantity, str):
+        return RANGES[quantity]
+    ends = [sorted(weight * end for end in RANGES[name]) for name, weight in quantity.terms]
+    return sum(low for low, _ in ends), sum(high for _, high in ends)
 
 
 @contextmanager

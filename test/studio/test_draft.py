@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rebt_ros.behavior_tree import nodes, paths
@@ -19,11 +20,19 @@ from rebt_ros.errors import OptionError
 from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
 from rebt_ros.learning.pipeline import learn_from
-from rebt_ros.logic.conditions import Threshold
+from rebt_ros.logic.conditions import (
+    Difference,
+    Interval,
+    Literal,
+    Quantity,
+    Threshold,
+    WeightedSum,
+)
 from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.studio import draft
 from rebt_ros.studio.draft import Change, Draft
 from rebt_ros.studio.learning_view import (
+    bar_edges,
     changed_rows,
     differences_in_words,
     draft_view,
@@ -165,7 +174,7 @@ def test_rules_of_the_robot_file_are_asked_as_well() -> None:
     assert [rule["kept"] for rule in draft_view(learning, None, same)["rules"]] == [False, True]
 
 
-def test_levels_recall_and_histograms_are_those_of_what_was_learned() -> None:
+def test_levels_and_recall_are_those_of_what_was_learned() -> None:
     levels = levels_view(learned())
     leaves = [level["leaves"] for level in levels]
     assert leaves == sorted(leaves, reverse=True)
@@ -173,8 +182,72 @@ def test_levels_recall_and_histograms_are_those_of_what_was_learned() -> None:
     view = learning_view(learned(), levels)
     assert (view["rows"], view["demonstrations"], view["channel"]) == (180, 3, "action")
     assert view["recalls"].keys() == {"go", "left", "right", "stop"}
-    bars = histogram(learned(), "x")
+
+
+def test_a_histogram_counts_what_a_condition_compares() -> None:
+    path, _ = a_threshold(learned())
+    bars = histogram(learned(), path)
+    assert bars["quantity"] in {"x", "y"}
     assert sum(map(sum, bars["counts"].values())) == 180
     assert len(bars["edges"]) == len(bars["counts"]["go"]) + 1
-    with pytest.raises(OptionError, match="no numeric feature 'z'"):
-        histogram(learned(), "z")
+    with pytest.raises(OptionError, match=r"no node at 9.*changed since"):
+        histogram(learned(), "9")
+    action = next(
+        path for path, node in paths.walk(learned().learned.tree) if isinstance(node, nodes.Action)
+    )
+    with pytest.raises(OptionError, match="compares no number"):
+        histogram(learned(), paths.text_of(action))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "words"),
+    [
+        (Difference("x", "y"), "x − y"),
+        (WeightedSum((("x", 1.0), ("y", 2.5))), "x + 2.5 × y"),
+        ("y", "y"),
+    ],
+)
+def test_a_histogram_is_of_what_is_computed_from_several_features(
+    quantity: Quantity, words: str
+) -> None:
+    its = learned()
+    terms = {"y": 1.0} if isinstance(quantity, str) else dict(quantity.terms)
+    values = sum(
+        weight * its.table.states[:, place]
+        for place, name in enumerate(("x", "y"))
+        if (weight := terms.get(name))
+    )
+    bars = histogram(with_condition(its, Interval(quantity, 0.0, 0.5)), "0")
+    assert bars["quantity"] == words
+    assert (bars["edges"][0], bars["edges"][-1]) == pytest.approx((min(values), max(values)))
+    assert {label: sum(counts) for label, counts in bars["counts"].items()} == {
+        label: (its.table.chosen == code).sum() for code, label in enumerate(its.table.actions)
+    }
+    # What was dragged on it counts from then on.
+    changed = draft.with_threshold("0", 0.25)(with_condition(its, Threshold(quantity, 0.5)))
+    node = paths.node_at(changed.learned.tree, (0,))
+    assert node == nodes.Condition(Literal(Threshold(quantity, 0.25)))
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False)))
+@example([0.0, 5e-324])
+@example([-1.7e308, 1.7e308])
+def test_a_histogram_of_any_values_has_bars_or_is_refused_in_a_sentence(
+    values: list[float],
+) -> None:
+    try:
+        edges = bar_edges(np.array(values), "x")
+    except OptionError as err:
+        refusal = str(err)
+    else:
+        assert np.isfinite(edges).all()
+        assert edges[0] <= min(values) <= max(values) <= edges[-1]
+        return
+    assert re.fullmatch(r"(there is no histogram of )?x.*[.]", refusal)
+
+
+def with_condition(learning: Learning, condition: Threshold | Interval) -> Learning:
+    """A policy whose tree begins with a condition."""
+    action = next(iter(nodes.actions(learning.learned.tree)))
+    tree = nodes.Sequence((nodes.Condition(Literal(condition)), action))
+    return learning.edited(lambda _: tree)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from pretend_robot import (
     demonstration,
     draft,
     fill,
+    histogram,
     large_tree,
     node,
     pretended,
@@ -36,7 +38,7 @@ from selenium.webdriver.common.keys import Keys
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.logic.conditions import Literal, Threshold
+from rebt_ros.logic.conditions import Difference, Literal, Threshold, WeightedSum
 from rebt_ros.studio.board import Section
 from rebt_ros.studio.tree_view import published_view
 
@@ -146,7 +148,7 @@ def test_the_live_tree_tells_statuses_values_and_the_command(page: Browser) -> N
             lambda path=path, words=words: (
                 words in (page.node(tree, path).get_attribute("aria-label") or "")
             ),
-            page.node(tree, path).get_attribute("aria-label") or "",
+            f"{path} does not say {words!r}",
         )
         assert page.node(tree, path).get_attribute("aria-level") == level
     active = page.run(
@@ -583,6 +585,8 @@ def test_demonstrations_are_left_out_trimmed_and_split(page: Browser, asked: Any
     assert trimmed["name"] == NAMES[1]
     assert (trimmed["from"], trimmed["to"]) == pytest.approx((6, 18), abs=0.05)
     page.until(lambda: not page.all(f"{item} .editor input"))
+    page.press("#toasts .toast:last-child button", "Undo")
+    assert asked("restore_demonstration") == {"name": NAMES[1]}
     page.press(f"{item} button", "Split in two")
     page.run(_SLIDE, f'{item} input[aria-label="Split at"]', 9)
     page.press(f"{item} .editor button", "Make two of it")
@@ -645,6 +649,41 @@ def test_a_threshold_is_dragged_on_its_histogram(page: Browser, asked: Any) -> N
     assert smaller < value
     page.press("#editor-body button", "Change it to")
     assert asked("threshold") == {"path": "0.1", "value": smaller, "end": "at_most"}
+
+
+def test_sums_and_differences_have_values_margins_and_histograms(
+    page: Browser, studio: Pretend, asked: Any
+) -> None:
+    plain = small_tree()
+    weighted = WeightedSum((("front", 1.0), ("right", 2.5)))
+    tests = (Threshold(weighted, 6.0), Threshold(Difference("left", "right"), 0.4))
+    go, rest = plain.actions[1], plain.actions[2]
+    sequence = nodes.Sequence((*(nodes.Condition(Literal(one)) for one in tests), go))
+    learned = replace(plain, tree=nodes.Selector((sequence, rest)))
+    studio.answers["histogram"] = lambda asked: ("", histogram(learned, asked["path"]))
+    studio.show_tree(learned)
+    studio.board.replace(Section.DRAFT, draft(learned))
+    values = values_at(QUIET) | {"left": 1.0, "front": 3.0, "right": 0.75}
+    studio.board.replace(Section.VALUES, values)
+    studio.board.replace(Section.NAMES, {"front": "right ahead"})
+    page.sees("4.88", '#live-tree [data-path="0.0"] .meter')
+    page.sees("0.25", '#live-tree [data-path="0.1"] .meter')
+    page.sees("right ahead + 2.5 × right\n4.88", "#live-values")
+    page.sees("left − right\n0.25", "#live-values")
+    page.press_node("#live-tree", "0.0")
+    page.sees("Now 4.88: holds, by 1.13.", "#why-node-now")
+    page.section("curate")
+    page.press_node("#curate-tree", "0.0")
+    page.sees("at which right ahead + 2.5 × right. Drag the line.", "#editor-body")
+    handle = page.one("#editor .handle")
+    ends = [float(handle.get_attribute(f"aria-value{end}") or "nan") for end in ("min", "max")]
+    assert ends == pytest.approx([0.8, 14.0])
+    page.run("arguments[0].scrollIntoView({block: 'center'})", handle)
+    ActionChains(page.driver).drag_and_drop_by_offset(handle, 80, 0).perform()
+    value = float(handle.get_attribute("aria-valuenow") or "nan")
+    assert 6.0 < value < 14.0
+    page.press("#editor-body button", "Change it to")
+    assert asked("threshold") == {"path": "0.0", "value": value, "end": "at_most"}
 
 
 def test_nodes_are_chosen_moved_and_deleted(page: Browser, asked: Any) -> None:

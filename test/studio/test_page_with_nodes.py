@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -198,6 +200,26 @@ class Journey:
         page.until(lambda: page.all("#live-tree .active.kind-action"))
         self.kept("driving")
 
+    def all_are_killed(self) -> None:
+        """All nodes are killed and start again; the page stays open and heals."""
+        page = self.page
+        for node in self._nodes.values():
+            node.process.send_signal(signal.SIGKILL)
+        page.sees("The studio cannot be reached", "#banner")
+        self.kept("lost")
+        port = urlsplit(self._url).port
+        for name, parameters in NODES.items():
+            self._nodes[name].wait()
+            again = {"port": port} if name == "studio" else parameters
+            self._nodes[name] = self._start(name, again)
+        page.until(lambda: not page.one("#banner").is_displayed(), "the studio is not reached")
+        self.everybody_is_there()
+        # It was not enabled when it started: the page says so, and lets it drive.
+        page.press("#start")
+        self.commands_are("go", 0.4)
+        page.sees("go", "#command")
+        self.kept("healed")
+
     def correct(self) -> None:
         """A person takes over, which is a demonstration that is learned from."""
         page, peer = self.page, self.peer
@@ -219,7 +241,7 @@ class Journey:
         """The path of the node of the draft whose words begin so."""
         path = self.page.until(
             lambda: self.page.run(_FIND, f"#curate-tree {kind}", words),
-            f"there is no {words}, but {self.page.text('#curate-tree')}",
+            lambda: f"there is no {words}, but {self.page.text('#curate-tree')}",
         )
         return str(path)
 
@@ -281,4 +303,5 @@ def test_a_person_teaches_learns_curates_publishes_and_corrects_in_the_page(
         journey.learn()
         journey.curate()
         journey.publish()
+        journey.all_are_killed()
         journey.correct()

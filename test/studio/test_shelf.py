@@ -105,8 +105,24 @@ def test_a_demonstration_is_cut_to_a_stretch_and_can_be_had_back(tmp_path: Path)
     part = read_recording(tmp_path / "first-1.rec").demonstration
     assert part.states[:, 0].tolist() == [1.0, 2.0, 3.0]
     assert part.before == {"action": "a"}
-    shelf.restore("first")
-    assert actions_in(tmp_path) == {"first": "abcde", "first-1": "bcd"}
+    shelf.trim("first-1", 2.0, 9.0)
+    assert actions_in(tmp_path) == {"first-1-1": "d"}
+    # Nothing is learned from twice.
+    assert shelf.restore("first") == "first is whole again."
+    assert actions_in(tmp_path) == {"first": "abcde"}
+    assert list(shelf.views()) == ["first"]
+    shelf.trim("first", 0.0, 1.0)
+    assert actions_in(tmp_path) == {"first-1": "ab"}
+
+
+def test_what_is_only_called_like_a_part_stays(tmp_path: Path) -> None:
+    for name, actions in (("first", "abc"), ("first-1", "ab-"), ("first-2", "abcd")):
+        record(tmp_path, actions, name)
+    before = actions_in(tmp_path)
+    shelf = Shelf(tmp_path)
+    shelf.delete("first")
+    assert shelf.restore("first") == "first is back."
+    assert actions_in(tmp_path) == before
 
 
 def test_a_demonstration_is_split_in_two_between_rows(tmp_path: Path) -> None:

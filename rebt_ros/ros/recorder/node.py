@@ -24,7 +24,7 @@ from rebt_ros.demonstration.fields import names_of, values_of
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import OptionError
 from rebt_ros.live.arrival import LAST, ArrivalOrder
-from rebt_ros.live.recording_session import WRITE_ERROR, Answer, RecordingSession, Writer
+from rebt_ros.live.recording_session import NOT_HEARD, WRITE_ERROR, Answer, RecordingSession, Writer
 from rebt_ros.live.state_streams import StateStreams
 from rebt_ros.live.traffic import Traffic
 from rebt_ros.robot_file.binding import BoundTopic
@@ -445,7 +445,7 @@ class RecorderNode(Node):
         if not self._session.recording or not unheard:
             return answer
         return answer._replace(
-            message=f"{answer.message} Not heard so far: {', '.join(unheard)}; wait for ~/ready."
+            message=f"{answer.message} {NOT_HEARD} {', '.join(unheard)}; wait for ~/ready."
         )
 
     def _queue(self, place: int, take: Callable[[], object], *, waits: bool = False) -> None:

@@ -1,4 +1,8 @@
-"""Services of other nodes, called from threads that may wait."""
+"""Services of other nodes, called from threads that may wait.
+
+A node that was killed is known to the middleware for some seconds more, and one that has just
+started may not know yet where to answer.  Both lose calls without a word, so calls are made again.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +21,8 @@ from rebt_ros.errors import RebtError
 PATIENCE: Final = 10.0
 #: Between two looks at whether a node is still at work (seconds).
 _LOOK: Final = 0.5
+#: Looks in vain after which a call is made again.
+_LOOKS: Final = 2
 #: For a service that was not seen yet (seconds).
 _FINDING: Final = 2.0
 
@@ -25,6 +31,36 @@ _ENDING: Final = "the studio is ending."
 
 class CallError(RebtError):
     """A node did not do what it was asked."""
+
+
+def _never() -> bool:
+    """Nothing is seen of it."""
+    return False
+
+
+class Newcomers:
+    """Whether somebody has come since who cannot have heard what was said before.
+
+    Args:
+        count: Counts who is there; the middleware counts who was killed for some seconds more.
+    """
+
+    def __init__(self, count: Callable[[], int]) -> None:
+        self._count = count
+        self._there = 0
+
+    def begin(self) -> None:
+        """Says it, to all who are there."""
+        self._there = self._count()
+
+    @property
+    def have_come(self) -> bool:
+        """Whether one has come; to be asked again and again, since others go meanwhile."""
+        count = self._count()
+        came = count > self._there
+        if not came:
+            self._there = count
+        return came
 
 
 class Calls:
@@ -59,13 +95,15 @@ class Calls:
         Raises:
             CallError: It is not there, does not answer, or refuses.
         """
-        return self._call(service, SetBool.Request(data=on), PATIENCE)
+        return self._call(service, SetBool.Request(data=on), PATIENCE, _never, twice=True)
 
     def trigger(
         self,
         service: str,
         patience: float = PATIENCE,
-        works: Callable[[], bool] = lambda: False,
+        works: Callable[[], bool] = _never,
+        *,
+        twice: bool = False,
     ) -> str:
         """Calls a service without arguments.
 
@@ -74,31 +112,52 @@ class Calls:
             patience: How long to wait for the answer (seconds).
             works: Whether the node is seen to work on it, for which it has all the time it needs.
                 A node that was killed and started again knows nothing of the call, and rests.
+            twice: Whether it does no harm where it is called twice.  Otherwise it is called again
+                only where the node has started since, which cannot have got the call.
 
         Raises:
             CallError: It is not there, does not answer, or refuses.
         """
-        return self._call(service, Trigger.Request(), patience, works)
+        return self._call(service, Trigger.Request(), patience, works, twice=twice)
 
     def _call(
         self,
         service: str,
         request: Any,
         patience: float,
-        works: Callable[[], bool] = lambda: False,
+        works: Callable[[], bool],
+        *,
+        twice: bool,
     ) -> str:
         client = self._clients[service]
         if not client.wait_for_service(_FINDING):
             node = service.rpartition("/")[0]
             raise CallError(f"there is no {node} that answers: start it, or check its name.")
-        with self._changed:
-            if self._ended:
-                raise CallError(_ENDING)
-            future: Future = client.call_async(request)
-            future.add_done_callback(self._note)
-        answer = self._answer(future, patience, works)
+        servers = Newcomers(lambda: self._node.count_services(client.srv_name))
+        sent: list[Future] = []
+        # Counted in looks: time in which this machine stood still is no waiting.
+        left, looks = patience, 0
+        try:
+            while not self._ended and not any(future.done() for future in sent):
+                if not sent or (looks >= _LOOKS and (twice or servers.have_come)):
+                    servers.begin()
+                    looks = 0
+                    sent.append(self._send(client, request))
+                if left <= 0:
+                    break
+                with self._changed:
+                    self._changed.wait_for(
+                        lambda: self._ended or any(future.done() for future in sent),
+                        min(_LOOK, left),
+                    )
+                busy = works()
+                left = patience if busy else left - _LOOK
+                looks = 0 if busy else looks + 1
+        finally:
+            for future in sent:
+                client.remove_pending_request(future)
+        answer = next((future.result() for future in sent if future.done()), None)
         if answer is None:
-            client.remove_pending_request(future)
             late = (
                 f"{service} did not answer within {patience:.0f} s: ask again, or look at its log."
             )
@@ -107,15 +166,10 @@ class Calls:
             raise CallError(answer.message or f"{service} refused.")
         return str(answer.message) or "done."
 
-    def _answer(self, future: Future, patience: float, works: Callable[[], bool]) -> Any:
-        """What was answered; None if nothing was for as long as it is waited for."""
-        left = patience
-        while left > 0 and not (future.done() or self._ended):
-            # Counted in looks: time in which this machine stood still is no waiting.
-            with self._changed:
-                self._changed.wait_for(lambda: future.done() or self._ended, min(_LOOK, left))
-            left = patience if works() else left - _LOOK
-        return future.result() if future.done() else None
+    def _send(self, client: Client, request: Any) -> Future:
+        future: Future = client.call_async(request)
+        future.add_done_callback(self._note)
+        return future
 
     def _note(self, _: Future) -> None:
         with self._changed:

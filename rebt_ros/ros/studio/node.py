@@ -14,10 +14,11 @@ from std_msgs.msg import String
 from rebt_ros.demonstration.builder import is_label
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.learning.options import PsaChoice
+from rebt_ros.live.recording_session import NO_ROWS, NOT_HEARD
 from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
-from rebt_ros.ros.studio.calls import Calls
+from rebt_ros.ros.studio.calls import CallError, Calls
 from rebt_ros.ros.studio.publishing import Proposals
 from rebt_ros.ros.studio.robot_watch import RobotWatch
 from rebt_ros.ros.studio.server import Server
@@ -147,7 +148,7 @@ class StudioNode(Node):
             "learn": lambda _: self._workbench.learn(
                 lambda: calls.trigger(f"{settings.learner}/relearn", works=self._is_learning)
             ),
-            "cancel": lambda _: calls.trigger(f"{settings.learner}/cancel"),
+            "cancel": lambda _: calls.trigger(f"{settings.learner}/cancel", twice=True),
             "rollback": lambda _: calls.trigger(f"{settings.learner}/rollback"),
             "ping": lambda _: "",
             "moment": lambda asked: self._explaining.moment(asked.number("t")),
@@ -163,8 +164,14 @@ class StudioNode(Node):
         """Demonstrations."""
         calls, recorder = self._calls, self._settings.recorder
         return {
-            "record": lambda asked: calls.switch(f"{recorder}/record", asked.flag("on")),
-            "new_demonstration": lambda _: calls.trigger(f"{recorder}/new_demonstration"),
+            "record": lambda asked: _nothing_to_keep(
+                lambda: calls.switch(f"{recorder}/record", asked.flag("on")),
+                "recording has stopped; nothing was recorded since the last demonstration.",
+            ),
+            "new_demonstration": lambda _: _nothing_to_keep(
+                lambda: calls.trigger(f"{recorder}/new_demonstration", twice=True),
+                "there is nothing new to keep: drive the robot through the task first.",
+            ),
             "discard": lambda _: calls.trigger(f"{recorder}/discard_demonstration"),
             "failed": lambda _: calls.trigger(f"{recorder}/failed"),
             "leave_out": partial(self._on_shelf, self._shelf.leave_out),
@@ -222,8 +229,8 @@ class StudioNode(Node):
             return bench.change(named("moving", path), draft.moved(path, by))
 
         def histogram(asked: Arguments) -> Answer:
-            feature = asked.text("feature")
-            return feature, learning_view.histogram(bench.learning, feature)
+            path = asked.text("path")
+            return path, learning_view.histogram(bench.learning, path)
 
         return {
             "level": level,
@@ -267,6 +274,16 @@ class StudioNode(Node):
         sentence = change(name)
         self._show_demonstrations()
         return sentence
+
+
+def _nothing_to_keep(end: Callable[[], str], sentence: str) -> str:
+    """Ends a demonstration: that it has no rows is no fault, unless the recorder hears nothing."""
+    try:
+        return end()
+    except CallError as err:
+        if NO_ROWS in str(err) and NOT_HEARD not in str(err):
+            return sentence
+        raise
 
 
 def _login() -> str:

@@ -11,9 +11,12 @@ from std_msgs.msg import String
 
 from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.errors import RebtError
+from rebt_ros.ros.studio.calls import Newcomers
 
 #: For the learner's answer, proofs of rules included (seconds).
 _PATIENCE: Final = 30.0
+#: Between two looks at whether another learner has started (seconds).
+_LOOK: Final = 1.0
 
 
 class PublishingError(RebtError):
@@ -55,8 +58,17 @@ class Proposals:
             )
         with self._answered:
             self._answers.pop(name, None)
-            self._proposals.publish(String(data=document))
-            self._answered.wait_for(lambda: name in self._answers or self._ended, _PATIENCE)
+            learners = Newcomers(self._proposals.get_subscription_count)
+            waited, unheard = 0.0, True
+            while waited < _PATIENCE and not (name in self._answers or self._ended):
+                # A learner that has started since knows nothing of it.
+                if unheard:
+                    learners.begin()
+                    self._proposals.publish(String(data=document))
+                unheard = False
+                self._answered.wait_for(lambda: name in self._answers or self._ended, _LOOK)
+                waited += _LOOK
+                unheard = learners.have_come
             if name not in self._answers:
                 raise PublishingError(
                     f"{self._learner} did not answer within {_PATIENCE:.0f} s: look at its log."

@@ -255,7 +255,13 @@ class RobotWatch:
                 del self._heard[role]
                 self._board.update(Section.NODES, {role: _absent(role)})
                 if role == "executor":
-                    self._board.replace(Section.RUN, {})
+                    self._forget_run()
+
+    def _forget_run(self) -> None:
+        """The executor has ended: nothing is commanded, and the one that follows begins anew."""
+        self._document, self._statuses, self._commands = "", (), {}
+        self._board.replace(Section.RUN, {})
+        self._event(EventKind.DRIVING, "the tree rests: the executor has ended")
 
     def _note(self) -> None:
         self._timeline.note(

@@ -125,7 +125,7 @@ export class Demonstrations {
       range.value = value;
       return range;
     };
-    const does = button("", () => act(), { class: "primary" });
+    const does = button("", () => act(), { class: "primary", title: "The whole one can be restored for ten minutes" });
     let act;
     if (mode === "trim") {
       const [from, to] = [slider("From", 0, () => look()), slider("To", shown.seconds, () => look())];
@@ -153,7 +153,8 @@ export class Demonstrations {
   }
 
   async cut(item, verb, given) {
-    const answer = await this.ask(verb, given);
+    const undo = () => this.ask("restore_demonstration", { name: given.name });
+    const answer = await this.ask(verb, given, { undo });
     if (answer.ok) this.close(item);
   }
 }

@@ -2,9 +2,9 @@
 
 import { button, byId, element, setText } from "./dom.js";
 import { Histogram } from "./histogram.js";
-import { isNumeric } from "./margins.js";
+import { features, isNumeric } from "./margins.js";
 import { calm } from "./tree.js";
-import { sentence } from "./words.js";
+import { renamed, sentence } from "./words.js";
 
 /** The panel beside the draft. */
 export class Editor {
@@ -29,7 +29,8 @@ export class Editor {
       );
       return;
     }
-    const words = node.label === undefined ? node.text : this.state.shown(node.label);
+    const shown = (name) => this.state.shown(name);
+    const words = node.label === undefined ? renamed(node.text, features(node), shown) : shown(node.label);
     setText(byId("editor-title"), words);
     const parts = [element("p", {}, sentence(node.explanation))];
     const place = element("div", { class: "place" });
@@ -83,26 +84,23 @@ export class Editor {
   }
 
   async histogram(node, place) {
-    const feature = node.feature ?? null;
-    if (feature === null) {
-      place.replaceChildren(this.typed(node));
-      return;
-    }
     place.replaceChildren(element("p", { class: "hint" }, "Counting…"));
-    const answer = await this.ask("histogram", { feature }, { quiet: true });
+    const answer = await this.ask("histogram", { path: node.path }, { quiet: true });
     if (this.node !== node) return;
     if (!answer.ok) {
       place.replaceChildren(element("p", { class: "hint" }, sentence(answer.message)), this.typed(node));
       return;
     }
     const change = (value, end) => this.change(node, value, end);
+    const shown = (name) => this.state.shown(name);
+    const quantity = renamed(answer.data.quantity, features(node), shown);
     place.replaceChildren(
-      element("p", { class: "hint" }, `How often each action was shown at which ${this.state.shown(feature)}. Drag the line.`),
-      new Histogram(answer.data, node, change, (name) => this.state.shown(name)).element,
+      element("p", { class: "hint" }, `How often each action was shown at which ${quantity}. Drag the line.`),
+      new Histogram(answer.data, node, change, shown).element,
     );
   }
 
-  /** Thresholds without a histogram: of the difference of two values, say. */
+  /** Thresholds without a histogram: where nothing is known of what was shown. */
   typed(node) {
     const ends = ["above", "at_most"].filter((end) => node[end] !== null);
     return element(
@@ -116,7 +114,7 @@ export class Editor {
           "div",
           { class: "tools" },
           element("label", {}, words, field),
-          button("Change it", () => field.value !== "" && this.change(node, Number(field.value), end), { class: "primary" }),
+          button("Change it", () => field.value !== "" && this.change(node, Number(field.value), end), { class: "primary", title: "Changes the draft; the robot gets it once you publish" }),
         );
       }),
     );

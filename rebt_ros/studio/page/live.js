@@ -2,11 +2,11 @@
 
 import { fillOf, inkOf } from "./colors.js";
 import { byId, element, keyed, setAttribute, setText, show, svg } from "./dom.js";
-import { isNumeric, marginText, range, read, readText, share } from "./margins.js";
+import { features, isNumeric, marginText, range, read, readText, share } from "./margins.js";
 import { Strip } from "./strip.js";
 import { Tree, actingPaths, calm, treeTools } from "./tree.js";
 import { showNoWhy, showWhy } from "./why.js";
-import { count, number, sentence } from "./words.js";
+import { count, number, renamed, sentence, yesNo } from "./words.js";
 
 const CONDITIONS = {
   running: "The tree drives the robot",
@@ -38,7 +38,6 @@ export class Live {
     });
     byId("live-tools").append(treeTools(this.tree, { jump: () => this.jump() }));
     byId("why-now").addEventListener("click", () => this.why(null));
-    this.bars = new Map();
   }
 
   /** What is shown: the present, or the moment that was stepped back to. */
@@ -131,37 +130,47 @@ export class Live {
   // --- values ---
 
   showValues(view, values) {
+    if (this.computedIn !== view) {
+      this.computedIn = view;
+      // What conditions compute from several features, each once.
+      this.computed = new Map(view.nodes.filter((node) => node.terms).map((node) => [`computed ${node.quantity}`, node]));
+    }
     const names = Object.keys(values).sort();
+    const sums = names.length ? [...this.computed] : [];
     keyed(
       byId("live-values"),
-      names.map((name) => [name, values[name]]),
-      (name) => this.bar(name, view),
-      (child, value, name) => this.measure(child, name, value, view),
+      [...names.map((name) => [name, { feature: name }]), ...sums],
+      () => this.bar(),
+      (child, quantity) => this.measure(child, quantity, values, view),
     );
     show(byId("live-no-values"), names.length === 0);
   }
 
-  bar(name) {
+  bar() {
     const picture = svg("svg", { class: "value-bar", viewBox: "0 0 100 16", preserveAspectRatio: "none", "aria-hidden": "true" });
-    const text = element("span", { class: "value" });
-    return element("li", {}, element("span", { class: "name" }, this.state.shown(name)), text, picture);
+    return element("li", {}, element("span", { class: "name" }), element("span", { class: "value" }), picture);
   }
 
-  measure(child, name, value, view) {
+  measure(child, quantity, values, view) {
     const [title, text, picture] = child.children;
-    if (child.view !== view) {
-      child.view = view;
-      child.last = undefined;
-      setText(title, this.state.shown(name));
-      const tests = view.nodes.filter((node) => node.feature === name);
+    const names = this.state.get("names");
+    if (child.view !== view || child.names !== names) {
+      [child.view, child.names, child.last] = [view, names, undefined];
+      const shown = (name) => this.state.shown(name);
+      setText(title, quantity.terms ? renamed(quantity.quantity, features(quantity), shown) : shown(quantity.feature));
+      const tests = view.nodes.filter((node) => node.quantity === quantity.quantity && node.feature === quantity.feature);
       child.truth = tests.some((node) => node.truth !== undefined);
       child.range = this.scale(picture, tests.filter(isNumeric));
       child.needle = picture.lastElementChild;
     }
+    const value = read(quantity, values);
     if (child.last === value) return;
     child.last = value;
-    setText(text, child.truth ? readText({ feature: name, truth: true }, { [name]: value }) : number(value));
-    if (!child.range || typeof value !== "number") return;
+    setText(text, child.truth ? yesNo(value) : number(value));
+    if (!child.range) return;
+    const known = typeof value === "number";
+    setAttribute(child.needle, "visibility", known ? null : "hidden");
+    if (!known) return;
     const x = (share(value, child.range) * 100).toFixed(1);
     setAttribute(child.needle, "transform", `translate(${x} 0)`);
   }

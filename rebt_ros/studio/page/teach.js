@@ -29,7 +29,7 @@ export class Teach {
       title: "Keeps this demonstration; the next action begins another one",
     });
     this.discard = button("Discard this one", () => ask("discard"), {
-      title: "Deletes the demonstration that is being recorded, or the last one where none is",
+      title: "Deletes the demonstration that is being recorded, or the one just kept if you have not driven since",
     });
     this.failed = button("The robot failed: show it", () => ask("failed"), {
       title: "Says that the robot failed; what you show next is its correction",
@@ -64,7 +64,8 @@ export class Teach {
     show(this.on, !records);
     show(this.off, records);
     show(this.next, records);
-    for (const one of [this.on, this.off, this.next, this.discard, this.failed]) one.disabled = !isThere;
+    for (const one of [this.on, this.off, this.next, this.failed]) one.disabled = !isThere;
+    this.discard.disabled = !records;
     const line = byId("recorder-state");
     line.classList.toggle("recording", records);
     if (!isThere) setText(line, "The recorder is not running");

@@ -3,7 +3,7 @@
 import { element, setAttribute, setText, svg } from "./dom.js";
 import { arrange } from "./layout.js";
 import { features, holding, isNumeric, range, read, readText, share } from "./margins.js";
-import { statusWords } from "./words.js";
+import { renamed, statusWords } from "./words.js";
 
 const METER = 22;
 const MARGIN = 14;
@@ -248,11 +248,7 @@ export class Tree {
   words(node) {
     const { shown } = this.options;
     if (node.label !== undefined) return shown(node.label);
-    let words = node.text;
-    for (const feature of features(node)) {
-      if (shown(feature) !== feature) words = words.replace(feature, shown(feature));
-    }
-    return words;
+    return renamed(node.text, features(node), shown);
   }
 
   part(node) {

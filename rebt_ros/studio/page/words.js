@@ -73,3 +73,19 @@ export function sentence(text) {
   const begun = words[0].toUpperCase() + words.slice(1);
   return /[.!?:]$/.test(begun) ? begun : `${begun}.`;
 }
+
+/**
+ * A text with the names that people gave, each where the robot's name stands.
+ *
+ * @param {string} text - With the robot's names.
+ * @param {string[]} names - Those that may stand in it.
+ * @param {(name: string) => string} shown - What people call it.
+ */
+export function renamed(text, names, shown) {
+  if (names.every((name) => shown(name) === name)) return text;
+  // The longest first: one name may begin like another.
+  const sorted = [...names].sort((left, right) => right.length - left.length);
+  const plain = sorted.map((name) => name.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")).join("|");
+  // A name that is part of a word is none.
+  return text.replace(new RegExp(`(?<![\\p{L}\\p{N}_])(?:${plain})(?![\\p{L}\\p{N}_])`, "gu"), (name) => shown(name));
+}
