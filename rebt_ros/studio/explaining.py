@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rebt_ros.arrays import IntArray
 from rebt_ros.behavior_tree import nodes, paths
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.wording import name_text
@@ -21,10 +22,11 @@ from rebt_ros.learning.learning import Learning
 from rebt_ros.studio.timeline import Moment, Timeline
 from rebt_ros.studio.tree_view import Json
 from rebt_ros.studio.verbs import Answer, Arguments
-from rebt_ros.verification.acting import Step, commanding
+from rebt_ros.verification.acting import Step, acting_leaves, commanding
 from rebt_ros.verification.describing import value_text
 from rebt_ros.verification.explaining import Explanation, explain
 from rebt_ros.verification.explanation_text import lines
+from rebt_ros.verification.support import Support, support_of
 
 
 class Explaining:
@@ -79,6 +81,36 @@ class Explaining:
             raise OptionError("nothing is known of that time: the last ten minutes are kept.")
         return self._of_moment(moment)
 
+    def branch(self, asked: Arguments) -> Answer:
+        """In which demonstrations a branch acts: of the draft, or of the robot's tree.
+
+        Raises:
+            RebtError: There is no such branch, or its tree was learned from something else.
+        """
+        learning = self._learning()
+        learned = self._published() if asked.flag("robot") else learning.learned
+        if learned is None:
+            raise OptionError("no tree is published yet.")
+        try:
+            path = paths.path_of(asked.text("path"))
+            paths.node_at(learned.tree, path)
+        except LookupError as err:
+            raise OptionError(f"{err}: the tree has changed since; try again.") from err
+        table = learning.table
+        channels = {action.channel for action in nodes.actions(learned.tree)}
+        if learned.features != table.features or channels - {table.channel}:
+            raise OptionError("this tree was not learned from the demonstrations that are here.")
+        # A condition acts with the branch that it is in.
+        while path and not any(nodes.actions(paths.node_at(learned.tree, path))):
+            path = path[:-1]
+        support = support_of(table, _rows_of(learned.tree, path, table))
+        shown = ", ".join(f"{name_text(label)} {rows}" for label, rows in support.actions)
+        words = f"{support.rows} of {len(table)} rows that were shown"
+        return (
+            f"its branch acts in {words}: {shown}." if shown else f"its branch acts in {words}.",
+            {"from": _visits(support)},
+        )
+
     def _of_demonstration(self, name: str, seconds: float) -> Answer:
         learning = self._learning()
         table = learning.table
@@ -107,6 +139,21 @@ class Explaining:
         return "then", _told(learned, values, explain(learned, values, histories, tables))
 
 
+def _rows_of(tree: nodes.Node, path: paths.Path, table: DemonstrationTable) -> IntArray:
+    """The rows in which an action of a branch acts."""
+    leaves = [where for where, node in paths.walk(tree) if isinstance(node, nodes.Action)]
+    its = [place for place, where in enumerate(leaves) if where[: len(path)] == path]
+    return np.flatnonzero(np.isin(acting_leaves(tree, table), its))
+
+
+def _visits(support: Support) -> list[dict[str, Json]]:
+    """The demonstrations with most rows, and where in them the first one is."""
+    return [
+        {"demonstration": name, "rows": rows, "seconds": seconds}
+        for name, rows, seconds in support.demonstrations
+    ]
+
+
 def _told(
     learned: LearnedTree, values: Sequence[float], explanations: Sequence[Explanation]
 ) -> dict[str, Json]:
@@ -118,10 +165,7 @@ def _told(
             told.append(f"Channel {explanation.channel}:")
         told += lines(learned, values, explanation)
         if explanation.support is not None:
-            sources += [
-                {"demonstration": name, "rows": rows, "seconds": seconds}
-                for name, rows, seconds in explanation.support.demonstrations
-            ]
+            sources += _visits(explanation.support)
         acting = acting or _acting(learned, explanation)
     return {
         "lines": told,

@@ -44,6 +44,23 @@ _SWITCHES: Final = (
     f"--window-size={WIDTH},{HEIGHT}",
 )
 
+#: From a message of the studio to the next picture that is on the screen (ms).
+STOPWATCH: Final = """window.paints = [];
+    const Plain = window.WebSocket;
+    window.WebSocket = class extends Plain {
+      constructor(...given) {
+        super(...given);
+        this.addEventListener('message', () => {
+          const begun = performance.now();
+          requestAnimationFrame(() => {
+            const channel = new MessageChannel();
+            channel.port1.onmessage = () => window.paints.push(performance.now() - begun);
+            channel.port2.postMessage(0);
+          });
+        });
+      }
+    };"""
+
 
 class Browser:
     """One Chromium, and what tests ask of it.
@@ -167,6 +184,11 @@ class Browser:
     def command(self, name: str, **given: Any) -> Any:
         """A command of Chrome's DevTools protocol."""
         return self.driver.execute_cdp_cmd(name, given)
+
+    def busy(self) -> float:
+        """For how long the page's main thread has worked (seconds); `Performance` is enabled."""
+        metrics = self.command("Performance.getMetrics")["metrics"]
+        return float(next(one["value"] for one in metrics if one["name"] == "TaskDuration"))
 
     def look(self, *, width: int = WIDTH, height: int = HEIGHT, dark: bool = False) -> None:
         """Sets the size of the window, and light or dark."""

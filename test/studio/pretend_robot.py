@@ -341,6 +341,10 @@ def fill(pretend: Pretend) -> LearnedTree:
     )
     pretend.answers |= {
         "explain": lambda _: ("then", explanation()),
+        "branch": lambda _: (
+            "its branch acts in 68 of 1677 rows that were shown: turn_left 68.",
+            {"from": explanation()["from"]},
+        ),
         "histogram": lambda asked: ("", histogram(learned, asked["path"])),
         "moment": lambda asked: (
             "then",

@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("aiohttp")
 pytest.importorskip("selenium")
 
-from chromium import Browser
+from chromium import STOPWATCH, Browser
 from pretend_robot import (
     DOCUMENT,
     EARLIER,
@@ -399,12 +399,17 @@ def test_a_pause_steps_back_and_returns(page: Browser, studio: Pretend, asked: A
 
 def test_a_node_tells_why(page: Browser, studio: Pretend, asked: Any) -> None:
     page.press_node("#live-tree", "1.0")
-    assert asked("explain") == {"path": "1.0"}
+    assert asked("explain") == {}
+    assert asked("branch") == {"path": "1.0", "robot": True}
+    page.sees("Its branch acts in 68 of 1677 rows", "#why-node-from")
     page.sees("because target_bearing > 0.25", "#why-text")
     page.sees("holds, by", "#why-node-now")
     page.press("#why-text .from button")
     page.until(lambda: page.one("#panel-explain").is_displayed())
-    assert asked("explain", 2) == {"demonstration": NAMES[0], "seconds": 0}
+    assert asked("explain", 2) == {"demonstration": NAMES[0], "seconds": 3.4}
+    page.press_node("#explain-tree", "1.1")
+    page.sees("Its branch acts in 68 of 1677 rows", "#explain-branch")
+    assert asked("branch", 2) == {"path": "1.1", "robot": False}
     assert studio.verbs("moment") == []
 
 
@@ -430,7 +435,7 @@ def test_the_tree_is_walked_with_the_keyboard(page: Browser, asked: Any) -> None
     keys(Keys.END)
     assert focused() == "3"
     keys(Keys.HOME, Keys.ENTER)
-    assert asked("explain") == {"path": "root"}
+    assert asked("branch") == {"path": "root", "robot": True}
 
 
 def test_the_sections_are_walked_with_the_keyboard(page: Browser) -> None:
@@ -694,6 +699,7 @@ def test_nodes_are_chosen_moved_and_deleted(page: Browser, asked: Any) -> None:
     page.press("#editor-body button", "All at the same time")
     assert asked("psa", 2) == {"path": "2.2", "choice": "parallel"}
     page.press_node("#curate-tree", "1")
+    page.sees("Its branch acts in 68 of 1677 rows", "#editor-body")
     page.press("#editor-body button", "Earlier")
     assert asked("move") == {"path": "1", "by": -1}
     page.press("#editor-body button", "Later")
@@ -821,16 +827,16 @@ def test_an_update_costs_far_less_than_drawing_a_large_tree(
     studio.show_tree(learned)
     studio.run(learned, 0.0)
     chromium.look()
-    chromium.command("Page.addScriptToEvaluateOnNewDocument", source=_STOPWATCH)
+    chromium.command("Page.addScriptToEvaluateOnNewDocument", source=STOPWATCH)
     chromium.open(studio.url)
     # Of the processor's time: what others do on this machine must not count.
     chromium.command("Performance.enable", timeDomain="threadTicks")
     costs = {}
     for act, times in ((draw, 6), (update, 20)):
-        busy = _busy(chromium)
+        busy = chromium.busy()
         for number in range(times):
             act(number)
-        costs[act.__name__] = (_busy(chromium) - busy) / times
+        costs[act.__name__] = (chromium.busy() - busy) / times
     paints = sorted(chromium.run("return window.paints"))
     record_property("costs", costs)
     print(
@@ -839,11 +845,6 @@ def test_an_update_costs_far_less_than_drawing_a_large_tree(
         f"p95 {paints[int(len(paints) * 0.95)]:.0f} ms"
     )
     assert costs["update"] < costs["draw"] / 2
-
-
-def _busy(browser: Browser) -> float:
-    metrics = browser.command("Performance.getMetrics")["metrics"]
-    return float(next(one["value"] for one in metrics if one["name"] == "TaskDuration"))
 
 
 def _ends(browser: Browser, studio: Pretend) -> bool:
@@ -864,23 +865,6 @@ _SLIDE = """const one = document.querySelector(arguments[0]);
 _CHOOSE = """const one = document.querySelector(arguments[0]);
     one.value = arguments[1];
     one.dispatchEvent(new Event('change', {bubbles: true}));"""
-
-#: From a message of the studio to the next picture that is on the screen (ms).
-_STOPWATCH = """window.paints = [];
-    const Plain = window.WebSocket;
-    window.WebSocket = class extends Plain {
-      constructor(...given) {
-        super(...given);
-        this.addEventListener('message', () => {
-          const begun = performance.now();
-          requestAnimationFrame(() => {
-            const channel = new MessageChannel();
-            channel.port1.onmessage = () => window.paints.push(performance.now() - begun);
-            channel.port2.postMessage(0);
-          });
-        });
-      }
-    };"""
 
 #: Words with a contrast below 4.5 to the colour behind them (WCAG 2 AA), or 3 where they are large.
 _FAINT = """

@@ -200,6 +200,22 @@ class Journey:
         page.until(lambda: page.all("#live-tree .active.kind-action"))
         self.kept("driving")
 
+    def correct(self) -> None:
+        """A person takes over, which is a demonstration that is learned from."""
+        page, peer = self.page, self.peer
+        page.section("teach")
+        if page.one("#recorder-buttons .primary").text == "Start recording":
+            page.press("#recorder-buttons button", "Start recording")
+        self.by_hand.clear()
+        hold(page, "stop", lambda: repeated(peer, self.by_hand, "stop"))
+        page.sees("takeover", "#demonstrations")
+        self.kept("takeover")
+        page.press("#recorder-buttons button", "Well done")
+        page.section("learn")
+        page.press("#learn", "Learn from 4 demonstrations")
+        page.sees("of 4 demonstrations", "#learn-draft-summary")
+        self.kept("learned_again", "#learn-chart")
+
     def all_are_killed(self) -> None:
         """All nodes are killed and start again; the page stays open and heals."""
         page = self.page
@@ -216,25 +232,10 @@ class Journey:
         self.everybody_is_there()
         # It was not enabled when it started: the page says so, and lets it drive.
         page.press("#start")
-        self.commands_are("go", 0.4)
-        page.sees("go", "#command")
+        self.commands_are("back", 0.05)
+        page.section("live")
+        page.sees("back", "#command")
         self.kept("healed")
-
-    def correct(self) -> None:
-        """A person takes over, which is a demonstration that is learned from."""
-        page, peer = self.page, self.peer
-        page.section("teach")
-        if page.one("#recorder-buttons .primary").text == "Start recording":
-            page.press("#recorder-buttons button", "Start recording")
-        self.by_hand.clear()
-        hold(page, "stop", lambda: repeated(peer, self.by_hand, "stop"))
-        page.sees("takeover", "#demonstrations")
-        self.kept("takeover")
-        page.press("#recorder-buttons button", "Well done")
-        page.section("learn")
-        page.press("#learn", "Learn from 4 demonstrations")
-        page.sees("of 4 demonstrations", "#learn-draft-summary")
-        self.kept("learned_again", "#learn-chart")
         assert page.run("return window.untouched")
 
     def _found(self, kind: str, *words: str) -> str:
@@ -303,5 +304,5 @@ def test_a_person_teaches_learns_curates_publishes_and_corrects_in_the_page(
         journey.learn()
         journey.curate()
         journey.publish()
-        journey.all_are_killed()
         journey.correct()
+        journey.all_are_killed()

@@ -1,7 +1,9 @@
 """Services of other nodes, called from threads that may wait.
 
 A node that was killed is known to the middleware for some seconds more, and one that has just
-started may not know yet where to answer.  Both lose calls without a word, so calls are made again.
+started may not know yet where to answer.  Both lose calls without a word, so calls are made again:
+at once where that does no harm, otherwise only to a node that has started since and so cannot have
+got the call.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ PATIENCE: Final = 10.0
 #: Between two looks at whether a node is still at work (seconds).
 _LOOK: Final = 0.5
 #: Looks in vain after which a call is made again.
-_LOOKS: Final = 2
+_LOOKS: Final = 4
 #: For a service that was not seen yet (seconds).
 _FINDING: Final = 2.0
 
@@ -31,6 +33,11 @@ _ENDING: Final = "the studio is ending."
 
 class CallError(RebtError):
     """A node did not do what it was asked."""
+
+
+def _done(sent: list[Future]) -> Any:
+    """The first answer to what was sent; None as long as there is none."""
+    return next((future.result() for future in sent if future.done()), None)
 
 
 def _never() -> bool:
@@ -55,12 +62,9 @@ class Newcomers:
 
     @property
     def have_come(self) -> bool:
-        """Whether one has come; to be asked again and again, since others go meanwhile."""
-        count = self._count()
-        came = count > self._there
-        if not came:
-            self._there = count
-        return came
+        """Whether one has come since the last look; look often, since others go meanwhile."""
+        before, self._there = self._there, self._count()
+        return self._there > before
 
 
 class Calls:
@@ -102,23 +106,19 @@ class Calls:
         service: str,
         patience: float = PATIENCE,
         works: Callable[[], bool] = _never,
-        *,
-        twice: bool = False,
     ) -> str:
-        """Calls a service without arguments.
+        """Calls a service without arguments; again only where its node has started since.
 
         Args:
             service: Its name.
             patience: How long to wait for the answer (seconds).
             works: Whether the node is seen to work on it, for which it has all the time it needs.
                 A node that was killed and started again knows nothing of the call, and rests.
-            twice: Whether it does no harm where it is called twice.  Otherwise it is called again
-                only where the node has started since, which cannot have got the call.
 
         Raises:
             CallError: It is not there, does not answer, or refuses.
         """
-        return self._call(service, Trigger.Request(), patience, works, twice=twice)
+        return self._call(service, Trigger.Request(), patience, works, twice=False)
 
     def _call(
         self,
@@ -136,27 +136,29 @@ class Calls:
         servers = Newcomers(lambda: self._node.count_services(client.srv_name))
         sent: list[Future] = []
         # Counted in looks: time in which this machine stood still is no waiting.
-        left, looks = patience, 0
+        left, looks, due = patience, 0, 0
         try:
-            while not self._ended and not any(future.done() for future in sent):
-                if not sent or (looks >= _LOOKS and (twice or servers.have_come)):
+            while not (self._ended or _done(sent)):
+                if looks == due:
                     servers.begin()
-                    looks = 0
                     sent.append(self._send(client, request))
+                    due = looks + _LOOKS if twice else -1
                 if left <= 0:
                     break
                 with self._changed:
-                    self._changed.wait_for(
-                        lambda: self._ended or any(future.done() for future in sent),
-                        min(_LOOK, left),
-                    )
+                    self._changed.wait_for(lambda: self._ended or _done(sent), min(_LOOK, left))
                 busy = works()
                 left = patience if busy else left - _LOOK
-                looks = 0 if busy else looks + 1
+                looks += 1
+                if servers.have_come:
+                    # It has all the time that it needs, and some to find out about the studio.
+                    left, due = patience, looks + _LOOKS
+                elif busy:
+                    due = -1
         finally:
             for future in sent:
                 client.remove_pending_request(future)
-        answer = next((future.result() for future in sent if future.done()), None)
+        answer = _done(sent)
         if answer is None:
             late = (
                 f"{service} did not answer within {patience:.0f} s: ask again, or look at its log."

@@ -148,11 +148,12 @@ class StudioNode(Node):
             "learn": lambda _: self._workbench.learn(
                 lambda: calls.trigger(f"{settings.learner}/relearn", works=self._is_learning)
             ),
-            "cancel": lambda _: calls.trigger(f"{settings.learner}/cancel", twice=True),
+            "cancel": lambda _: calls.trigger(f"{settings.learner}/cancel"),
             "rollback": lambda _: calls.trigger(f"{settings.learner}/rollback"),
             "ping": lambda _: "",
             "moment": lambda asked: self._explaining.moment(asked.number("t")),
             "explain": self._explaining.explain,
+            "branch": self._explaining.branch,
         }
 
     def _is_learning(self) -> bool:
@@ -169,7 +170,7 @@ class StudioNode(Node):
                 "recording has stopped; nothing was recorded since the last demonstration.",
             ),
             "new_demonstration": lambda _: _nothing_to_keep(
-                lambda: calls.trigger(f"{recorder}/new_demonstration", twice=True),
+                lambda: calls.trigger(f"{recorder}/new_demonstration"),
                 "there is nothing new to keep: drive the robot through the task first.",
             ),
             "discard": lambda _: calls.trigger(f"{recorder}/discard_demonstration"),

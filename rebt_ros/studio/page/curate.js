@@ -19,7 +19,7 @@ export class Curate {
     this.state = state;
     this.ask = ask;
     this.visit = visit;
-    this.editor = new Editor({ state, ask });
+    this.editor = new Editor({ state, ask, visit });
     this.tree = new Tree(byId("curate-tree"), {
       label: "Your draft",
       choose: (node) => this.editor.show(node, this.tree.view, true),

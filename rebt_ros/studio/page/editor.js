@@ -4,13 +4,15 @@ import { button, byId, element, setText } from "./dom.js";
 import { Histogram } from "./histogram.js";
 import { features, isNumeric } from "./margins.js";
 import { calm } from "./tree.js";
+import { showBranch } from "./why.js";
 import { renamed, sentence } from "./words.js";
 
 /** The panel beside the draft. */
 export class Editor {
-  constructor({ state, ask }) {
+  constructor({ state, ask, visit }) {
     this.state = state;
     this.ask = ask;
+    this.visit = visit;
     this.node = null;
     this.view = null;
     this.shown = null;
@@ -33,6 +35,8 @@ export class Editor {
     const words = node.label === undefined ? renamed(node.text, features(node), shown) : shown(node.label);
     setText(byId("editor-title"), words);
     const parts = [element("p", {}, sentence(node.explanation))];
+    const from = element("div");
+    parts.push(from);
     const place = element("div", { class: "place" });
     if (isNumeric(node)) parts.push(place);
     if (this.choosable(node)) parts.push(this.psa(node));
@@ -40,6 +44,13 @@ export class Editor {
     body.replaceChildren(...parts);
     if (chosen) byId("editor").scrollIntoView({ block: "nearest", behavior: calm() ? "auto" : "smooth" });
     if (isNumeric(node)) this.histogram(node, place);
+    this.branch(node, from);
+  }
+
+  /** Shows in how much of what was shown the branch acts, before somebody deletes it, say. */
+  async branch(node, host) {
+    const answer = await this.ask("branch", { path: node.path, robot: false }, { quiet: true });
+    if (this.node === node) showBranch(host, answer, this.visit);
   }
 
   /** Whether its actions may run at the same time or one after the other. */

@@ -3,8 +3,8 @@
 import { byId, element, keyed, setAttribute, setText, show } from "./dom.js";
 import { Strip } from "./strip.js";
 import { thumbnail } from "./thumbnail.js";
-import { Tree, actingPaths, treeTools } from "./tree.js";
-import { showNoWhy, showWhy } from "./why.js";
+import { Tree, actingPaths, calm, treeTools } from "./tree.js";
+import { showBranch, showNoWhy, showWhy } from "./why.js";
 import { clock, count, duration } from "./words.js";
 
 const ROBOT = "";
@@ -25,7 +25,7 @@ export class Explain {
       label: "The tree at that moment",
       shown,
       live: true,
-      choose: (node) => this.explain(node.path),
+      choose: (node) => this.branch(node),
     });
     byId("explain-tools").append(treeTools(this.tree, { jump: () => this.acting && this.tree.reveal(this.acting) }));
     this.strip = new Strip(byId("explain-strip"), state, (time) => this.ofRobot(time));
@@ -65,14 +65,16 @@ export class Explain {
   }
 
   /** Chooses a demonstration by name; the empty name is the robot. */
-  visit(name) {
+  visit(name, seconds = 0) {
     this.name = name;
-    this.seconds = 0;
+    this.seconds = seconds;
     this.told = null;
     this.drawn = null;
+    this.node = null;
+    show(byId("explain-branch"), false);
     this.picture();
     this.render(new Set());
-    if (!this.isRobot && this.state.get("demonstrations")[name]) this.at(0);
+    if (!this.isRobot && this.state.get("demonstrations")[name]) this.at(seconds);
     else showNoWhy(byId("explain-why"), "Choose a moment: press a point of the picture above.");
   }
 
@@ -118,20 +120,19 @@ export class Explain {
   at(seconds) {
     this.seconds = seconds;
     this.point();
-    this.explain(null);
+    this.explain();
   }
 
   ofRobot(time) {
     this.time = time;
-    this.explain(null);
+    this.explain();
   }
 
   /** Asks why; while an answer is under way only the newest question waits. */
-  async explain(path) {
+  async explain() {
     const given = this.isRobot
       ? this.time === null || this.time === undefined ? {} : { t: this.time }
       : { demonstration: this.name, seconds: this.seconds };
-    if (path !== null) given.path = path;
     this.wanted = given;
     if (this.busy) return;
     this.busy = true;
@@ -151,7 +152,18 @@ export class Explain {
     this.told = answer.data;
     showWhy(byId("explain-why"), answer.data, this.go);
     this.color();
-    if (this.acting && path === null) this.tree.reveal(this.acting);
+    if (this.acting) this.tree.reveal(this.acting);
+  }
+
+  /** Shows from which demonstrations the branch of a node comes. */
+  async branch(node) {
+    this.node = node;
+    const answer = await this.ask("branch", { path: node.path, robot: this.isRobot }, { quiet: true });
+    if (this.node !== node) return;
+    setText(byId("explain-node"), node.explanation);
+    showBranch(byId("explain-from"), answer, this.go);
+    show(byId("explain-branch"), true);
+    byId("explain-branch").scrollIntoView({ block: "nearest", behavior: calm() ? "auto" : "smooth" });
   }
 
   color() {

@@ -5,7 +5,7 @@ import { byId, element, keyed, setAttribute, setText, show, svg } from "./dom.js
 import { features, isNumeric, marginText, range, read, readText, share } from "./margins.js";
 import { Strip } from "./strip.js";
 import { Tree, actingPaths, calm, treeTools } from "./tree.js";
-import { showNoWhy, showWhy } from "./why.js";
+import { showBranch, showNoWhy, showWhy } from "./why.js";
 import { count, number, renamed, sentence, yesNo } from "./words.js";
 
 const CONDITIONS = {
@@ -246,11 +246,18 @@ export class Live {
     setText(byId("why-node-now"), sentence(words));
   }
 
+  /** Shows from which demonstrations the branch of a node comes. */
+  async branch(node) {
+    this.node = node;
+    byId("why-node-from").replaceChildren();
+    const answer = await this.ask("branch", { path: node.path, robot: true }, { quiet: true });
+    if (this.node === node) showBranch(byId("why-node-from"), answer, this.visit);
+  }
+
   async why(node) {
-    if (node) this.node = node;
+    if (node) this.branch(node);
     this.showChosen(this.scene.values);
     const given = this.strip.time === null ? {} : { t: this.strip.time };
-    if (node) given.path = node.path;
     const answer = await this.ask("explain", given, { quiet: true });
     if (node) byId("why").scrollIntoView({ block: "nearest", behavior: calm() ? "auto" : "smooth" });
     if (answer.ok) showWhy(byId("why-text"), answer.data, this.visit);

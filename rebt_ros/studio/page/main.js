@@ -29,10 +29,10 @@ async function ask(verb, given = {}, { quiet = false, undo = null } = {}) {
   return answer;
 }
 
-/** Goes to a demonstration, from wherever it is named. */
-function visit(name) {
+/** Goes to a demonstration, from wherever it is named, and to a moment of it. */
+function visit(name, seconds = 0) {
   tabs.choose("explain");
-  sections.explain.visit(name);
+  sections.explain.visit(name, seconds);
 }
 
 const given = { state, ask, visit };

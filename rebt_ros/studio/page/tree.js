@@ -47,8 +47,9 @@ export class Tree {
     this.chosen = null;
     this.focused = "root";
     this.query = "";
-    this.statuses = null;
     this.values = {};
+    /** The parts in sight, or nearly: what cannot be seen need not be drawn ten times a second. */
+    this.near = [];
     this.links = svg("g", { class: "links", "aria-hidden": "true" });
     this.nodes = svg("g", { role: "presentation" });
     this.picture = svg("svg", { class: "tree" }, this.links, this.nodes);
@@ -62,6 +63,7 @@ export class Tree {
     setAttribute(this.picture, "aria-label", this.options.label);
     host.append(this.picture);
     new ResizeObserver(() => this.fit()).observe(host);
+    host.addEventListener("scroll", () => this.look(), { passive: true });
   }
 
   /** Draws a tree; what was folded, chosen and focused stays as far as it is there. */
@@ -91,19 +93,35 @@ export class Tree {
   status(statuses, values, acting) {
     const active = this.ancestors(acting);
     const fits = statuses?.length === this.parts.length;
+    this.values = values;
     this.parts.forEach((part, place) => {
-      const status = fits ? statuses[place] : null;
-      if (part.status !== status) this.mark(part, status);
+      part.next = fits ? statuses[place] : null;
       const isActive = active.has(part.node.path);
-      if (part.active !== isActive) {
-        part.active = isActive;
-        part.group.classList.toggle("active", isActive);
-        part.link?.classList.toggle("active", isActive);
-        // What runs lies above what does not where two lines meet.
-        if (isActive && part.link) this.links.append(part.link);
-      }
-      if (part.meter) this.measure(part, values);
+      if (part.active === isActive) return;
+      part.active = isActive;
+      part.group.classList.toggle("active", isActive);
+      part.link?.classList.toggle("active", isActive);
+      // What runs lies above what does not where two lines meet.
+      if (isActive && part.link) this.links.append(part.link);
     });
+    for (const part of this.near) this.refresh(part);
+  }
+
+  /** Finds out what is in sight, and brings it up to date. */
+  look() {
+    const { scrollLeft, scrollTop, clientWidth, clientHeight } = this.host;
+    const scale = this.zoom ?? this.fitting();
+    // Half a screen more on each side, so that little has to be caught up with while it is scrolled.
+    const [left, right] = [scrollLeft / scale - clientWidth, (scrollLeft + 1.5 * clientWidth) / scale];
+    const [top, bottom] = [scrollTop / scale - clientHeight, (scrollTop + 1.5 * clientHeight) / scale];
+    this.near = this.parts.filter(({ at, node }) =>
+      at && at.x + node.width > left && at.x < right && at.y + node.height + METER > top && at.y < bottom);
+    for (const part of this.near) this.refresh(part);
+  }
+
+  refresh(part) {
+    if (part.status !== part.next) this.mark(part, part.next);
+    if (part.meter) this.measure(part, this.values);
   }
 
   mark(part, status) {
@@ -125,9 +143,9 @@ export class Tree {
     const value = read(node, values);
     if (meter.value === value) return;
     meter.value = value;
-    setText(meter.text, readText(node, values));
-    if (!meter.needle) return;
     const known = typeof value === "number";
+    setText(meter.text, meter.needle && !known ? "?" : readText(node, values));
+    if (!meter.needle) return;
     setAttribute(meter.needle, "visibility", known ? null : "hidden");
     if (known) {
       const x = meter.from + share(value, meter.range) * meter.length;
@@ -232,6 +250,7 @@ export class Tree {
     const scale = this.zoom ?? this.fitting();
     this.picture.style.width = `${Math.round(this.width * scale)}px`;
     this.picture.style.height = `${Math.round(this.height * scale)}px`;
+    this.look();
   }
 
   // --- drawing ---
@@ -240,6 +259,7 @@ export class Tree {
     this.links.replaceChildren();
     this.nodes.replaceChildren();
     this.parts = this.view.nodes.map((node) => this.part(node));
+    this.near = [];
     this.byPath = new Map(this.parts.map((part) => [part.node.path, part]));
     this.nodes.append(...this.parts.map((part) => part.group));
     if (!this.byPath.has(this.focused)) this.focused = "root";
@@ -267,7 +287,7 @@ export class Tree {
       text,
       svg("g", { class: "badge" }, svg("circle", { r: 9 }), sign),
     );
-    const part = { node, group, sign, status: null, active: false, link: null, meter: null, toggle: null };
+    const part = { node, group, sign, status: null, next: null, active: false, at: null, link: null, meter: null, toggle: null };
     if (this.options.live && isMetered(node)) part.meter = this.meter(node, group);
     if (!this.options.still) {
       setAttribute(group, "role", "treeitem");
@@ -346,7 +366,8 @@ export class Tree {
     this.height = arranged.height + 2 * MARGIN;
     setAttribute(this.picture, "viewBox", `${-MARGIN} ${-MARGIN} ${this.width} ${this.height}`);
     for (const part of this.parts) {
-      const at = arranged.places.get(part.node.path);
+      const at = arranged.places.get(part.node.path) ?? null;
+      part.at = at;
       setAttribute(part.group, "display", at ? null : "none");
       if (at) setAttribute(part.group, "transform", `translate(${at.x.toFixed(1)} ${at.y.toFixed(1)})`);
       if (part.toggle) {
@@ -396,6 +417,7 @@ export class Tree {
     const group = this.byPath.get(path)?.group;
     if (!group) return;
     setAttribute(group, "tabindex", 0);
+    this.refresh(this.byPath.get(path));
     if (now) group.focus();
   }
 

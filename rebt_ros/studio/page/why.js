@@ -15,8 +15,7 @@ export function showWhy(host, data, visit) {
   const parts = [];
   lines.forEach((line, place) => {
     const depth = Math.floor((line.length - line.trimStart().length) / 2);
-    const name = place === 0 ? "p" : "p";
-    parts.push(element(name, { class: `why depth-${Math.min(depth, 3)}${place === 0 ? " first" : ""}` }, line.trim()));
+    parts.push(element("p", { class: `why depth-${Math.min(depth, 3)}${place === 0 ? " first" : ""}` }, line.trim()));
   });
   const least = data.least ?? [];
   if (least.length) {
@@ -25,16 +24,23 @@ export function showWhy(host, data, visit) {
       element("ul", {}, ...least.map((line) => element("li", {}, line.trim()))),
     );
   }
-  const from = data.from ?? [];
-  if (from.length) {
-    const visits = from.map(({ demonstration, rows, seconds }) => {
-      const name = String(demonstration).replace(/\.rec$/, "");
-      const words = `${shortName(name)}: ${count(rows, "row")}${seconds ? `, ${duration(seconds)}` : ""}`;
-      return button(words, () => visit(name), { title: `Look at ${name}` });
-    });
-    parts.push(element("h4", {}, "Learned from"), element("div", { class: "from" }, ...visits));
-  }
+  if (data.from?.length) parts.push(element("h4", {}, "Learned from"), visits(data.from, visit));
   host.replaceChildren(...parts);
+}
+
+/** In how much of what was shown a branch acts, with buttons that lead to where it does. */
+export function showBranch(host, answer, visit) {
+  const from = answer.data?.from ?? [];
+  host.replaceChildren(element("p", { class: "hint" }, sentence(answer.message)), ...(from.length ? [visits(from, visit)] : []));
+}
+
+function visits(from, visit) {
+  const buttons = from.map(({ demonstration, rows, seconds }) => {
+    const name = String(demonstration).replace(/\.rec$/, "");
+    const words = `${shortName(name)}: ${count(rows, "row")}${seconds ? `, from ${duration(seconds)} on` : ""}`;
+    return button(words, () => visit(name, seconds), { title: `Look at ${name}` });
+  });
+  return element("div", { class: "from" }, ...buttons);
 }
 
 /** Says that there is no explanation, and why. */
