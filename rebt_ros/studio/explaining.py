@@ -163,9 +163,15 @@ def _told(
     for explanation in explanations:
         if len(explanations) > 1:
             told.append(f"Channel {explanation.channel}:")
-        told += lines(learned, values, explanation)
-        if explanation.support is not None:
-            sources += _visits(explanation.support)
+        its = _visits(explanation.support) if explanation.support is not None else []
+        named = tuple(f"{visit['demonstration']}: " for visit in its)
+        # The demonstrations are told by buttons that lead to them.
+        told += [
+            line
+            for line in lines(learned, values, explanation)
+            if not line.lstrip().startswith(named)
+        ]
+        sources += its
         acting = acting or _acting(learned, explanation)
     return {
         "lines": told,

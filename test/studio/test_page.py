@@ -321,11 +321,25 @@ def test_two_trees_stand_side_by_side(seen: Browser) -> None:
 
 
 def test_pictures_of_all_sections(seen: Browser, pictures: Path) -> None:
+    heights = {"learn": 1000, "curate": 1320, "explain": 1000}
     for section in SECTIONS:
+        seen.look(height=heights.get(section, 900))
         seen.section(section)
+        if section == "learn":
+            seen.until(lambda: seen.all("#learn-chart .point"))
+        if section == "curate":
+            seen.press_node("#curate-tree", "0.1")
+            seen.one("#editor .handle")
+        if section == "explain":
+            seen.run(_CHOOSE, "#explain-which", NAMES[0])
+            seen.run(_SLIDE, "#explain-seconds", 14)
+            seen.until(lambda: seen.all("#explain-tree .active.kind-action"))
+        seen.run("scrollTo(0, 0)")
+        seen.drawn()
         seen.picture(pictures / f"{section}.png")
     seen.look(dark=True)
     seen.picture(pictures / "explain_dark.png")
+    seen.run(_CHOOSE, "#explain-which", "")
 
 
 # --- the connection ---

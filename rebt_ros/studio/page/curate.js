@@ -5,8 +5,7 @@ import { Editor } from "./editor.js";
 import { changedWords } from "./learn.js";
 import { features } from "./margins.js";
 import { Tree, treeTools } from "./tree.js";
-import { shortName } from "./why.js";
-import { clock, count, sentence } from "./words.js";
+import { clock, count, sentence, shortName } from "./words.js";
 
 const RULE_WORDS = { true: "kept", false: "broken", null: "not known" };
 const RULE_SIGNS = { true: "✓", false: "✕", null: "?" };

@@ -93,7 +93,7 @@ export class Live {
     const words = past
       ? "What the tree commanded at that moment"
       : isThere
-        ? (CONDITIONS[run.condition] ?? run.condition ?? "Nothing is known of the robot yet")
+        ? (CONDITIONS[run.condition] ?? run.condition ?? (this.state.get("tree").view ? "Nothing is known of the robot yet" : CONDITIONS["waiting for a tree"]))
         : "The executor is not running";
     setText(byId("condition"), sentence(words));
     const drives = past || run.condition === "running";

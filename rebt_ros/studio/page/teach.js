@@ -120,6 +120,6 @@ function figure(key, value) {
     "messages lost": "messages lost",
     "failed episodes": "failures that were shown right",
   }[key];
-  if (!words || (value === "0" && key.endsWith("lost"))) return null;
+  if (!words || (value === "0" && key !== "rows")) return null;
   return [words, value];
 }

@@ -1,7 +1,7 @@
 // Sentences that come and go: what was done, what was refused, and how to take it back.
 
 import { button, byId, element, setText } from "./dom.js";
-import { sentence } from "./words.js";
+import { sentence, withShortNames } from "./words.js";
 
 const STAYS = 6000;
 const STAYS_LONGER = 14000;
@@ -17,7 +17,7 @@ const LONG = 200;
  *   back what was done.
  */
 export function say(text, { bad = false, undo = null } = {}) {
-  const words = sentence(text);
+  const words = sentence(withShortNames(text));
   if (!words) return;
   const region = byId("toasts");
   const toast = element("div", { class: bad ? "toast bad" : "toast" });

@@ -338,7 +338,7 @@ export class Tree {
     const parts = svg("g", { class: "meter", "aria-hidden": "true" }, text);
     group.append(parts);
     if (!isNumeric(node)) return { text, value: undefined };
-    const [from, length] = [44, Math.max(node.width - 46, 24)];
+    const [from, length] = [52, Math.max(node.width - 54, 24)];
     const span = range(node);
     const y = node.height + 7;
     const at = (place) => (from + place * length).toFixed(1);

@@ -1,7 +1,7 @@
 // The answer to "why?": what acted, what did not, from which demonstrations that comes.
 
 import { button, element } from "./dom.js";
-import { count, duration, sentence } from "./words.js";
+import { count, duration, number, sentence, shortName } from "./words.js";
 
 /**
  * Shows an explanation.
@@ -15,7 +15,7 @@ export function showWhy(host, data, visit) {
   const parts = [];
   lines.forEach((line, place) => {
     const depth = Math.floor((line.length - line.trimStart().length) / 2);
-    parts.push(element("p", { class: `why depth-${Math.min(depth, 3)}${place === 0 ? " first" : ""}` }, line.trim()));
+    parts.push(element("p", { class: `why depth-${Math.min(depth, 3)}${place === 0 ? " first" : ""}` }, shortened(line.trim())));
   });
   const least = data.least ?? [];
   if (least.length) {
@@ -43,15 +43,12 @@ function visits(from, visit) {
   return element("div", { class: "from" }, ...buttons);
 }
 
+/** With numbers that people can read; thresholds are short already. */
+function shortened(line) {
+  return line.replace(/-?\d+\.\d{5,}(?:e[+-]?\d+)?/g, (digits) => number(Number(digits), 4));
+}
+
 /** Says that there is no explanation, and why. */
 export function showNoWhy(host, message) {
   host.replaceChildren(element("p", { class: "hint" }, sentence(message)));
-}
-
-/** A recording's name without what only machines read. */
-export function shortName(name) {
-  const found = /^(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)/.exec(name);
-  if (!found) return name;
-  const [, , month, day, hour, minute, second] = found;
-  return `${day}.${month}. ${hour}:${minute}:${second}`;
 }

@@ -15,13 +15,13 @@ export function statusWords(status, isCondition) {
 }
 
 /** A value with as many digits as help. */
-export function number(value) {
+export function number(value, digits = 3) {
   if (value === null || value === undefined) return "not known";
   if (typeof value !== "number") return String(value);
   const size = Math.abs(value);
   if (size === 0) return "0";
-  if (size >= 1e6 || size < 1e-3) return value.toExponential(2);
-  return String(Number(value.toPrecision(3))).replace("-", "−");
+  if (size >= 1e6 || size < 1e-3) return value.toExponential(digits - 1);
+  return String(Number(value.toPrecision(digits))).replace("-", "−");
 }
 
 /** The value of a feature that is yes or no. */
@@ -88,4 +88,17 @@ export function renamed(text, names, shown) {
   const plain = sorted.map((name) => name.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")).join("|");
   // A name that is part of a word is none.
   return text.replace(new RegExp(`(?<![\\p{L}\\p{N}_])(?:${plain})(?![\\p{L}\\p{N}_])`, "gu"), (name) => shown(name));
+}
+
+/** A recording's name without what only machines read. */
+export function shortName(name) {
+  const found = /^(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)/.exec(name);
+  if (!found) return name;
+  const [, , month, day, hour, minute, second] = found;
+  return `${day}.${month}. ${hour}:${minute}:${second}`;
+}
+
+/** A sentence with the names of recordings as people see them, and without their directories. */
+export function withShortNames(text) {
+  return text.replace(/(?:\S*\/)?(\d{8}T\d{6}\.\d+Z-\d+-[0-9a-f]+)(?:\.rec)?/g, (_, name) => shortName(name));
 }
