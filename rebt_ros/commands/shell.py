@@ -47,7 +47,7 @@ def parse(
 
 
 def run(command: Callable[[], None], name: str) -> None:
-    """Runs a command; a `RebtError` becomes one sentence and exit code 1."""
+    """Runs a command; a `RebtError`, or a lack of memory, becomes one sentence and exit code 1."""
     try:
         command()
         sys.stdout.flush()
@@ -55,6 +55,11 @@ def run(command: Callable[[], None], name: str) -> None:
         _fail(f"{name}: {error}")
     except KeyboardInterrupt:
         sys.exit(_INTERRUPTED)
+    except MemoryError:
+        _fail(
+            f"{name}: there is not enough memory: close other programs, raise the limit (ulimit "
+            "-v), or name fewer inputs."
+        )
     except BrokenPipeError:
         # The reader, such as `head`, has seen enough.
         streams.drop(sys.stdout)

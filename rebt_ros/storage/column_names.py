@@ -99,6 +99,21 @@ def numbers_rows(name: str, cells: Sequence[str]) -> bool:
     return plain in _SECONDS or 2 * len(np.unique(values)) > len(values)
 
 
+def tells_time(cells: Sequence[str]) -> bool:
+    """Whether the values of a column are those of a clock, whatever it is called.
+
+    They are times between 2001 and 2096 in seconds, or in thousandths, millionths or billionths of
+    them, and never fall.
+    """
+    values = numbers([cell.strip() for cell in cells])
+    if values is None or len(values) < FEWEST_RISING or not np.all(np.diff(values) >= 0):
+        return False
+    begin, end = values[0], values[-1]
+    return begin < end and any(
+        1e9 * unit <= begin and end < 4e9 * unit for unit in (1.0, 1e3, 1e6, 1e9)
+    )
+
+
 def of_the_actions(names: Sequence[str]) -> int | None:
     """The position of the only column that is called after the actions; None if there is none."""
     found = [place for place, name in enumerate(names) if name.lower() in _ACTIONS]

@@ -41,6 +41,7 @@ from rebt_ros.storage.column_names import (
     label_position,
     numbers_rows,
     of_the_actions,
+    tells_time,
 )
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.records import NoRow, Records, read_records
@@ -230,7 +231,7 @@ def _numbering(
         name
         for place, name in enumerate(table.columns)
         if place not in table.labels and name not in known and name not in asked_for
-        if numbers_rows(name, shown.cells[place])
+        if numbers_rows(name, shown.cells[place]) or tells_time(shown.cells[place])
     }
     for name in sorted(found):
         integers = (
@@ -339,6 +340,12 @@ class _Shown:
     def check_numbers(self, place: int, values: FloatArray) -> None:
         wrong = np.flatnonzero(np.abs(values) > LARGEST_VALUE)
         if len(wrong):
+            if np.isinf(values[wrong[0]]) and "inf" in self.cells[place][wrong[0]].lower():
+                raise InputError(
+                    f"{self.table.path}, line {self.line(wrong[0])}: column "
+                    f"{self.table.columns[place]!r} holds {self.cells[place][wrong[0]]!r}: write a "
+                    "number in its place, such as the range of the sensor, or leave the cell empty."
+                )
             raise InputError(
                 f"{self.table.path}, line {self.line(wrong[0])}: column "
                 f"{self.table.columns[place]!r} holds {self.cells[place][wrong[0]]!r}: numbers "

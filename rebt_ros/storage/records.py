@@ -14,7 +14,7 @@ from pathlib import Path
 from rebt_ros.errors import InputError
 from rebt_ros.storage.cells import is_failed, is_missing, is_number
 from rebt_ros.storage.dialect import COMMENT, Dialect, dialect_of
-from rebt_ros.storage.text import read_text
+from rebt_ros.storage.text import read_text, windows_text
 
 
 class NoRow(Enum):
@@ -89,7 +89,20 @@ def read_records(path: Path) -> Records:
     Raises:
         InputError: The file cannot be read, or holds no table.
     """
-    text = read_text(path).replace(_BYTE_ORDER_MARK, "")
+    encoding: list[str] = []
+
+    def windows(data: bytes) -> str | None:
+        text = windows_text(data)
+        if text is not None:
+            encoding.append("it is not UTF-8, and read as Windows-1252: check its letters")
+        return text
+
+    text = read_text(path, windows).replace(_BYTE_ORDER_MARK, "")
+    if text.lstrip().startswith("<"):
+        raise InputError(
+            f"{path} is HTML or XML, and no table: save the table itself as CSV, or download the "
+            "file again."
+        )
     if text.lstrip().startswith(_JSON):
         raise InputError(f"{path} is JSON, and no table: name a CSV table, a bag or a recording.")
     dialect = dialect_of(text)
@@ -102,7 +115,9 @@ def read_records(path: Path) -> Records:
     left_out = Counter(reason for reason in reasons if reason is not None)
     left_out[NoRow.EMPTY] += sum(map(bool, rows)) - len(filled)
     rows = _without_blank_ends([rows[place] for place in kept])
-    notes = dialect.notes
+    notes = (*encoding, *dialect.notes)
+    if cut := _cut_off(text, rows):
+        notes += (cut,)
     if _lacks_a_name(rows):
         rows[0] = ["", *rows[0]]
         notes += ("the first column has no name, as where R writes the names of rows",)
@@ -193,6 +208,17 @@ def _lacks_a_name(rows: Sequence[Sequence[str]]) -> bool:
     if own == [str(number) for number in range(1, len(rows))]:
         return True
     return len(set(own)) == len(own) and not any(map(is_number, own))
+
+
+def _cut_off(text: str, rows: Sequence[Sequence[str]]) -> str:
+    """A note on a last line that seems to end amid its last word; empty where it does not."""
+    if text.endswith(("\n", "\r")) or len(rows) < 3 or not rows[-1]:
+        return ""
+    last = rows[-1][-1].strip()
+    others = {cells[-1].strip() for cells in rows[:-1] if cells}
+    if last and last not in others and any(one.startswith(last) for one in others):
+        return f"the last line has no end, and {last!r} in it may be the beginning of a longer word"
+    return ""
 
 
 def _parsed(path: Path, text: str, dialect: Dialect) -> tuple[list[list[str]], array[int]]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import codecs
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 from rebt_ros.errors import InputError
@@ -21,15 +23,24 @@ _UNMARKED = ((1, "utf-16-le"), (0, "utf-16-be"))
 #: So many bytes tell.
 _TELLING = 64
 
+_NOT_ASCII = re.compile(r"[^\x00-\x7f]+")
+#: What stands together within words of languages with Latin letters, or by itself.
+_LETTERS = re.compile(r"[À-ÖØ-öø-ÿŠšŽžŒœŸß]{1,2}")
+_SIGNS = re.compile(r"[°µ²³±€£§·«»¼½¾×÷¿¡ª\u00a0\u2013\u2014\u2018\u2019\u201c\u201d\u2026]{1,2}")
+
 
 #: Files that are no text have a zero byte among so many, as a rule.
 _BINARY = 1024
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path, otherwise: Callable[[bytes], str | None] = lambda _: None) -> str:
     """The text of a file of UTF-8, UTF-16 or UTF-32, without its byte order mark.
 
     Line ends are left as they are.
+
+    Args:
+        path: The file.
+        otherwise: Reads text in another encoding; None where it is not in that one either.
 
     Raises:
         InputError: There is no such file, or it cannot be read as text.
@@ -45,6 +56,9 @@ def read_text(path: Path) -> str:
     except UnicodeDecodeError as err:
         if b"\0" in data[:_BINARY]:
             raise _no_text(path) from err
+        other = otherwise(data)
+        if other is not None:
+            return other
         line = data.count(b"\n", 0, err.start) + 1
         raise InputError(f"{path}, line {line}: this is not UTF-8 text: save it as UTF-8.") from err
     if "\0" not in text:
@@ -54,6 +68,32 @@ def read_text(path: Path) -> str:
     raise InputError(
         f"{path} ends in zero bytes, as where a machine lost power while it was written: "
         "remove them with `tr -d '\\0' < FILE > COPY`."
+    )
+
+
+def windows_text(data: bytes) -> str | None:
+    """Text of Windows-1252, which spreadsheets write where most of it is in Latin letters.
+
+    None where it is not likely to be that, but for example Japanese.
+
+    >>> windows_text("Höhe in °C".encode("cp1252"))
+    'Höhe in °C'
+    >>> windows_text("Привет".encode("cp1251")) is None
+    True
+    """
+    try:
+        text = data.decode("cp1252")
+    except UnicodeDecodeError:
+        return None
+    return text if all(_is_likely(found) for found in _NOT_ASCII.finditer(text)) else None
+
+
+def _is_likely(found: re.Match[str]) -> bool:
+    """Whether what is not ASCII is part of a word with plain letters, or a sign."""
+    begin, end, text = found.start(), found.end(), found.string
+    beside = text[max(0, begin - 1) : begin] + text[end : end + 1]
+    return _SIGNS.fullmatch(found.group()) is not None or (
+        _LETTERS.fullmatch(found.group()) is not None and any(map(str.isalpha, beside))
     )
 
 

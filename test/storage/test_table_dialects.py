@@ -221,6 +221,17 @@ DIALECTS: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
         _written([[str(place), *row] for place, row in enumerate(_plain())], ["#", *NAMES]),
         ("a line of comments", "what the comment", "'#' numbers or dates"),
     ),
+    "Windows-1252": (
+        (_written(_plain()) + "# höhe in °C\n").encode("cp1252"),
+        ("read as Windows-1252", "1 line is a comment"),
+    ),
+    "times in seconds since 1970": (
+        _written(
+            [[f"17000000{place:02}.5", *row] for place, row in enumerate(_plain())],
+            ["received", *NAMES],
+        ),
+        ("'received' numbers or dates the rows",),
+    ),
     "utf-32": (_written(_plain()).encode("utf-32"), ()),
     "utf-16 without a mark": (_written(_plain()).encode("utf-16-le"), ()),
     "utf-16 of another order without a mark": (_written(_plain()).encode("utf-16-be"), ()),
@@ -262,6 +273,8 @@ def _decoded(content: str | bytes, dialect: str) -> str:
     """The text of a table."""
     if isinstance(content, str):
         return content.replace("\ufeff", "")
+    if dialect == "Windows-1252":
+        return content.decode("cp1252")
     for encoding in ("utf-32", "utf-16"):
         if dialect.startswith(encoding):
             order = {
@@ -283,6 +296,30 @@ def test_each_line_of_a_table_has_a_place_in_its_account(dialect: str, tmp_path:
     assert read.account is not None
     assert read.account.stated == len(text.splitlines()) - before - names - empty
     assert read.account.stated == read.account.read + sum(read.account.left_out.values())
+
+
+@pytest.mark.parametrize(
+    ("end", "notes"), [("le", 1), ("left", 0), ("back", 0), ("left\n", 0), ("le\n", 0)]
+)
+def test_a_last_word_that_may_be_cut_off_is_noted(tmp_path: Path, end: str, notes: int) -> None:
+    read = _read(tmp_path, f"x,action\n1,left\n2,go\n3,left\n4,{end}")
+    assert len([one for one in read.notes if "may be the beginning" in one]) == notes
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x,action\n1,go\ninf,turn\n", "line 3: column 'x' holds 'inf': write a number"),
+        ("<!DOCTYPE html>\n<html></html>\n", "is HTML or XML"),
+        ("x,action\n1,前進\n2,go\n".encode("shift_jis"), "is not UTF-8"),
+        ("x,action\n1,Привет\n2,go\n".encode("cp1251"), "is not UTF-8"),
+    ],
+)
+def test_what_is_no_table_as_it_stands_is_called_what_it_is(
+    tmp_path: Path, text: str | bytes, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        _read(tmp_path, text)
 
 
 def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Path) -> None:
