@@ -28,32 +28,33 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="check",
-        description="Proves or refutes rules of a learned tree for every state, and says what is "
-        "noticeable about it. The exit code is 1 unless every rule is proven.",
+        description="Proves rules about a learned tree for every state, or finds a state that "
+        "breaks them, and reports what is noticeable about the tree. The exit code "
+        "is 1 unless every rule is proven.",
     )
     parser.add_argument("tree", type=Path, metavar="TREE", help="tree.json of a learned tree")
     parser.add_argument("--rules", type=Path, metavar="FILE", help="rules.yaml (docs/rules.md)")
     parser.add_argument(
-        "--against", type=Path, metavar="TREE", help="another tree: where do they differ?"
+        "--against", type=Path, metavar="TREE", help="report where the tree differs from this one"
     )
     parser.add_argument(
         "--repair",
         type=Path,
         metavar="NEW",
-        help="write a tree with guards that make it keep its rules to this file",
+        help="write a tree to this file whose guards make it keep the rules",
     )
     parser.add_argument(
         "--action-results",
         action="store_true",
-        help="the robot reports how actions end, so that they may fail or go on "
-        "(the executor's action_result_topic)",
+        help="assume that the robot reports how actions end, so that they can fail or take "
+        "several ticks (the executor's action_result_topic)",
     )
     parser.add_argument(
         "--regions",
         type=int,
         default=3,
         metavar="N",
-        help="how many regions to list each time (default: %(default)s)",
+        help="maximum number of regions to list (default: %(default)s)",
     )
     add_input_options(parser, required=False)
     parsed = parse(parser, arguments)

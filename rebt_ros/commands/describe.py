@@ -19,22 +19,24 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="describe",
-        description="Lists the topics of a bag, or of the running robot, with their types, rates "
-        "and the values of each field (* varies), and writes a first robot file.",
+        description="Lists the topics of a bag or of the running robot, with their types, rates "
+        "and field values (* marks those that vary), and proposes a robot file.",
     )
     parser.add_argument("bag", nargs="?", type=Path, metavar="BAG", help="a rosbag2 bag")
-    parser.add_argument("--live", action="store_true", help="look at the running robot instead")
+    parser.add_argument(
+        "--live", action="store_true", help="read from the running robot instead of a bag"
+    )
     parser.add_argument(
         "--seconds",
         type=float,
         default=5.0,
         metavar="SECONDS",
-        help="how long to look at the running robot (default: %(default)s)",
+        help="how long to listen to the running robot (default: %(default)s)",
     )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write a first robot file")
     parser.add_argument(
-        "--force", action="store_true", help="write it even where there is such a file"
+        "--out", type=Path, metavar="FILE", help="write the proposed robot file here"
     )
+    parser.add_argument("--force", action="store_true", help="overwrite an existing file")
     parsed = parse(parser, arguments)
     run(lambda: _describe(parsed), "describe")
 

@@ -23,9 +23,9 @@ def _parser() -> argparse.ArgumentParser:
     defaults = Settings()
     parser = argparse.ArgumentParser(
         prog="experiment",
-        description="Reproduces the evaluation of the paper: simulates behavior trees, learns them "
-        "back with BT-Espresso and RE:BT-Espresso, and compares what was learned with what was "
-        "simulated. A run that was stopped goes on where it was when started again.",
+        description="Reproduces the evaluation of the paper: simulates behavior trees, learns "
+        "them back with BT-Espresso and RE:BT-Espresso, and compares learned with "
+        "simulated trees. An interrupted run continues when started again.",
     )
     parser.add_argument(
         "configurations",
@@ -49,9 +49,11 @@ def _parser() -> argparse.ArgumentParser:
         type=_names,
         default=(),
         metavar="NAME,…",
-        help="run these only (names without .json)",
+        help="run only these configurations (names without .json)",
     )
-    parser.add_argument("--limit", type=int, metavar="N", help="run the first N of them only")
+    parser.add_argument(
+        "--limit", type=int, metavar="N", help="run only the first N configurations"
+    )
     workers = parser.add_argument_group("workers")
     workers.add_argument(
         "--jobs", type=int, default=-1, metavar="N", help="processes (default: one per processor)"
@@ -59,8 +61,8 @@ def _parser() -> argparse.ArgumentParser:
     workers.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="use the workers of the Dask cluster with this scheduler, such as "
-        "tcp://127.0.0.1:8786; needs the package distributed",
+        help="scheduler of a Dask cluster to run on, such as tcp://127.0.0.1:8786; needs the "
+        "package distributed",
     )
     measure = parser.add_argument_group("the paper's measure, networkx")
     measure.add_argument(
@@ -68,14 +70,15 @@ def _parser() -> argparse.ArgumentParser:
         type=int,
         default=defaults.networkx_pairs,
         metavar="N",
-        help="try it on N random pairs of each configuration, 0 for none (default: %(default)s)",
+        help="number of random pairs of each configuration to try it on; 0 for none (default: "
+        "%(default)s)",
     )
     measure.add_argument(
         "--pair-seconds",
         type=float,
         default=defaults.pair_seconds,
         metavar="S",
-        help="give up on a pair, and count it, after so long (default: %(default)s)",
+        help="time limit for each pair (default: %(default)s)",
     )
     return parser
 

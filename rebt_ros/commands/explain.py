@@ -26,23 +26,25 @@ def main(arguments: list[str] | None = None) -> None:
         "--state",
         action="append",
         metavar="NAME=VALUE,…",
-        help="the state; features that are not named are missing; repeatable",
+        help="values of features; all others are missing; repeatable",
     )
     parser.add_argument(
         "--done",
         action="append",
         default=[],
         metavar="ACTION,…",
-        help="what was done before, the most recent action last; repeatable",
+        help="earlier actions, the most recent one last; repeatable",
     )
     parser.add_argument(
         "--row",
         type=int,
         metavar="N",
-        help="explain this row of the INPUT instead of a state, counted from 0",
+        help="explain this row of the INPUT, counted from 0, instead of a state",
     )
     parser.add_argument(
-        "--demonstration", metavar="NAME", help="of which demonstration (default: the only one)"
+        "--demonstration",
+        metavar="NAME",
+        help="demonstration that the row is from (default: the only one)",
     )
     add_input_options(parser, required=False)
     parsed = parse(parser, arguments)

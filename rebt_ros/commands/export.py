@@ -20,11 +20,11 @@ def main(arguments: list[str] | None = None) -> None:
         "--to",
         choices=list(LANGUAGES),
         default="btcpp",
-        help="btcpp: XML of BehaviorTree.CPP 4; py_trees: XML of py_trees 2.5 and newer "
-        "(default: %(default)s)",
+        help="btcpp: BehaviorTree.CPP 4 XML; py_trees: XML for py_trees 2.5 and later (default: "
+        "%(default)s)",
     )
     parser.add_argument(
-        "--out", type=Path, metavar="FILE", help="write it to this file instead of printing it"
+        "--out", type=Path, metavar="FILE", help="write to this file instead of standard output"
     )
     parsed = parse(parser, arguments)
     run(lambda: _export(parsed.tree, parsed.to, parsed.out), "export")

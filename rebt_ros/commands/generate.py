@@ -28,7 +28,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Writes random configuration files by the rules of the paper's experiments, "
         "for simulate to read: 2 or 3 subtrees under a Parallel or a Sequence root.",
     )
-    parser.add_argument("count", type=int, metavar="COUNT", help="how many")
+    parser.add_argument("count", type=int, metavar="COUNT", help="number of configurations")
     add_seed(parser)
     parser.add_argument(
         "--out",

@@ -20,20 +20,22 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="inspect",
-        description="Lists demonstrations with their lengths, actions, rates, gaps, idle stretches "
-        "and features that never vary, and names near-duplicates, rows that contradict others, and "
-        "what is far from the rest (docs/inspect.md).",
+        description="Lists demonstrations with their lengths, actions, rates, gaps, idle "
+        "stretches and constant features, and points out near-duplicates, "
+        "contradicting rows and outliers (docs/inspect.md).",
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all of it as JSON")
     parser.add_argument(
-        "--html", type=Path, metavar="FILE", help="write a page that needs nothing else"
+        "--json", type=Path, metavar="FILE", help="write all figures to this file as JSON"
+    )
+    parser.add_argument(
+        "--html", type=Path, metavar="FILE", help="write a self-contained HTML page to this file"
     )
     parser.add_argument(
         "--idle",
         type=float,
         default=IDLE_SECONDS,
         metavar="SECONDS",
-        help="how long nothing changes in an idle stretch, at least (default: %(default)s)",
+        help="minimum length of an idle stretch (default: %(default)s)",
     )
     add_input_options(parser)
     parsed = parse(parser, arguments)

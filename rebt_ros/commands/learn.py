@@ -44,10 +44,10 @@ from rebt_ros.storage.input_options import InputOptions
 from rebt_ros.storage.weights_file import read_weights
 
 _REDUCTIONS = {
-    "domain": "do not use that thresholds, categories and last actions exclude each other",
-    "repeated_factoring": "pull common conditions out once, as the paper does",
-    "priority": "keep each rule to its own states, instead of ordering them by priority",
-    "intervals": "ask x > 0.3 and x ≤ 0.5 one after the other, instead of 0.3 < x ≤ 0.5",
+    "domain": "do not use that thresholds, categories and last actions rule each other out",
+    "repeated_factoring": "factor out common conditions only once, as in the paper",
+    "priority": "make each rule complete in itself, instead of ordering rules by priority",
+    "intervals": "test x > 0.3 and x ≤ 0.5 separately, instead of 0.3 < x ≤ 0.5",
 }
 
 
@@ -104,21 +104,20 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--export",
         choices=list(LANGUAGES),
-        help="also write the tree in the language of another engine; btcpp: XML of "
-        "BehaviorTree.CPP 4, to DIR/btcpp.xml; py_trees: XML of py_trees 2.5 and newer, to "
-        "DIR/py_trees.xml",
+        help="also export the tree to another engine; btcpp: BehaviorTree.CPP 4 XML in "
+        "DIR/btcpp.xml; py_trees: XML for py_trees 2.5 and later in DIR/py_trees.xml",
     )
     parser.add_argument(
         "--rules",
         type=Path,
         metavar="FILE",
-        help="rules.yaml (docs/rules.md): unless the tree is proven to obey them, nothing is "
-        "written; rules of the robot file always count",
+        help="rules file (docs/rules.md): write nothing unless the tree is proven to keep these "
+        "rules; rules in the robot file always apply",
     )
     parser.add_argument(
         "--repair",
         action="store_true",
-        help="put guards into a tree that breaks a rule, instead of refusing it",
+        help="add guards to a tree that breaks a rule, instead of refusing it",
     )
     parser.add_argument(
         "--levels",
@@ -143,7 +142,7 @@ def _add_rows(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
             action="append",
             default=[],
             metavar="FEATURE",
-            help=f"take this feature as {kind.value}, whatever it looks like; repeatable",
+            help=f"treat this feature as {kind.value}; repeatable",
         )
     rows.add_argument(
         "--unit",
@@ -151,38 +150,38 @@ def _add_rows(parser: argparse.ArgumentParser, defaults: LearnOptions) -> None:
         type=_unit,
         default=[],
         metavar="FEATURE=UNIT",
-        help="the unit of a feature: features of different units, or one of which has none, are "
-        "not compared with each other; repeatable",
+        help="unit of a feature; features with different units, or with and without one, are not "
+        "compared with each other; repeatable",
     )
     rows.add_argument(
         "--lags",
         type=int,
         default=defaults.lags,
         metavar="N",
-        help="also learn from what each feature was 1 to N rows before; for evenly spaced rows, "
-        "and then the executor's rate must be theirs (default: %(default)s)",
+        help="also use the values of each feature 1 to N rows earlier; needs evenly spaced rows, "
+        "and the same rate in the executor (default: %(default)s)",
     )
     rows.add_argument(
         "--reaction-time",
         type=_amount,
         metavar="SECONDS|auto",
-        help="how late the demonstrator acted, to be undone before learning; auto: read off the "
-        "demonstrations where rows are samples, else 0 (default: auto)",
+        help="the demonstrator's reaction time, which is corrected before learning; auto: "
+        "estimated if rows are samples, else 0 (default: auto)",
     )
     rows.add_argument(
         "--weights",
         type=_weights,
         metavar="FILE",
-        help="how much demonstrations count: lines NAME,WEIGHT, or a JSON object; names as in "
-        "--exclude; others count 1, and 0 leaves one out (docs/learning.md)",
+        help="weights of demonstrations: lines NAME,WEIGHT, or a JSON object; names as in "
+        "--exclude; others have weight 1, and 0 leaves one out (docs/learning.md)",
     )
     rows.add_argument(
         "--upsample",
         type=word_of(Upsampling),
         default=defaults.upsample,
         metavar=_values(Upsampling),
-        help="make up rows for rare actions, for decision trees to be fitted to and never judged "
-        "on; svm-smote needs the package imbalanced-learn (default: none)",
+        help="synthesize rows for rare actions; they are used for training, never for "
+        "evaluation; svm-smote needs the package imbalanced-learn (default: none)",
     )
 
 
@@ -197,50 +196,50 @@ def _add_learning(parser: argparse.ArgumentParser, defaults: LearnOptions) -> No
     learning.add_argument(
         "--paper",
         action="store_true",
-        help="the paper's settings: Algorithm 1 as printed, depth 5, no pruning, last actions and "
-        "PSA nodes always, a Parallel root; other options change them",
+        help="use the paper's settings: Algorithm 1 as printed, depth 5, no pruning, last "
+        "actions and PSA nodes always, a Parallel root; other options override them",
     )
     learning.add_argument(
         "--max-depth",
         type=_depth,
         metavar="N|auto",
-        help="depth of the decision tree; auto: grow it fully and prune it (default: auto)",
+        help="maximum depth of the decision tree; auto: no limit, then prune (default: auto)",
     )
     learning.add_argument(
         "--ccp-alpha",
         type=_amount,
         metavar="ALPHA|auto",
-        help="complexity parameter of pruning, larger means smaller trees; auto: the largest "
-        "tree whose mean recall of the actions in cross-validation is not clearly below the best, "
-        "without those that are clearly less simple (default: auto)",
+        help="complexity parameter for pruning; larger values give smaller trees; auto: the "
+        "largest tree whose mean recall in cross-validation is not clearly below the best, "
+        "unless a smaller one explains the rows clearly more simply (default: auto)",
     )
     learning.add_argument(
         "--level",
         type=int,
         metavar="N",
-        help="number of the pruning level, instead of --ccp-alpha: larger means a smaller tree; "
-        "those on offer are listed with what each costs",
+        help="pruning level, instead of --ccp-alpha; larger numbers give smaller trees; learn "
+        "lists some levels with their figures",
     )
     learning.add_argument(
         "--delta",
         type=float,
-        help="actions with at least (1 - DELTA) of a leaf's largest share may stand together in "
-        f"a Parallel/Selector node (PSA); 0 to 1 (default: {defaults.delta})",
+        help="actions with at least (1 - DELTA) of the largest share in a leaf may form a "
+        f"Parallel/Selector (PSA) node; 0 to 1 (default: {defaults.delta})",
     )
     learning.add_argument(
         "--psa",
         type=word_of(Use),
         metavar=_values(Use),
-        help="whether PSA nodes stand in the tree; auto: where they raise agreement in "
-        "cross-validation (default: auto)",
+        help="whether to use PSA nodes; auto: where they raise agreement in cross-validation "
+        "(default: auto)",
     )
     learning.add_argument(
         "--exact",
         action="store_true",
         default=None,
-        help="grow trees on all rows, also where there are more than 100,000: otherwise on a "
-        "sample of whole demonstrations, with those of rare actions, and only prune, choose and "
-        "count by all rows",
+        help="grow trees on all rows even if there are more than 100,000; by default they grow "
+        "on a sample of whole demonstrations, and all rows are used for pruning, choosing "
+        "and figures",
     )
     learning.add_argument(
         "--random-state", type=int, default=defaults.random_state, help="default: %(default)s"
@@ -253,24 +252,23 @@ def _add_vocabulary(parser: argparse.ArgumentParser) -> None:
         "--history",
         type=_history,
         metavar=f"auto|{_values(History)}",
-        help="what the tree may test of what was done before: the previous action, the last "
-        "action taken of the paper, or nothing; auto: the previous action where it makes the "
-        "rows simpler to explain (default: auto)",
+        help="what the tree may test about earlier actions: the previous action, the paper's "
+        "last action taken, or nothing; auto: the previous action, if it makes the rows "
+        "simpler to explain (default: auto)",
     )
     learning.add_argument(
         "--differences",
         type=word_of(Use),
         metavar=_values(Use),
-        help="whether the tree may compare two features, as in left < right; auto: where that "
-        "makes it a quarter smaller at the same agreement (default: auto)",
+        help="whether the tree may compare two features, as in left < right; auto: if that makes "
+        "it a quarter smaller at the same agreement (default: auto)",
     )
     learning.add_argument(
         "--sums",
         type=word_of(Use),
         metavar=_values(Use),
-        help="whether the tree may weigh features against each other, as in "
-        "angle + 0.4 × spin > 0.02; auto: where that takes less to describe what was shown "
-        "(default: auto)",
+        help="whether the tree may test weighted sums of features, as in angle + 0.4 × spin > "
+        "0.02; auto: where they describe the demonstrations more briefly (default: auto)",
     )
 
 
@@ -290,7 +288,7 @@ def _add_form(parser: argparse.ArgumentParser) -> None:
         "--psa-as",
         type=word_of(PsaChoice),
         metavar=_values(PsaChoice),
-        help="turn all PSA nodes into this (default: leave the choice open)",
+        help="replace all PSA nodes by this kind of node (default: keep them)",
     )
     for reduction in fields(Reductions):
         form.add_argument(
@@ -304,28 +302,29 @@ def _add_form(parser: argparse.ArgumentParser) -> None:
         dest="simplest",
         action="store_false",
         default=None,
-        help="keep the decision tree as it is grown, instead of the simplest of those that fit "
-        "the rows as well",
+        help="keep the decision tree as grown, instead of the simplest one that fits the rows "
+        "equally well",
     )
     form.add_argument(
         "--exact-thresholds",
         dest="readable_thresholds",
         action="store_false",
         default=None,
-        help="leave thresholds halfway between two rows, not at round values that they share",
+        help="keep thresholds halfway between two rows, instead of moving them to shared round "
+        "values",
     )
     form.add_argument(
         "--keep-mistakes",
         dest="leave_out_mistakes",
         action="store_false",
         default=None,
-        help="learn from rows that look like mistakes, too",
+        help="also learn from rows that look like mistakes",
     )
     form.add_argument(
         "--no-routines",
         dest="routines",
         action="store_false",
-        help="look for no Sequences and Repeaters in rows that share one state",
+        help="do not look for Sequences and Repeaters among rows with the same state",
     )
 
 
@@ -336,13 +335,13 @@ def _add_judging(parser: argparse.ArgumentParser, defaults: LearnOptions) -> Non
         type=float,
         default=defaults.test_fraction,
         metavar="SHARE",
-        help="share that is held out to judge the tree: of the rows, or of the demonstrations if "
-        "there are several (default: %(default)s)",
+        help="share to hold out for evaluation: of the demonstrations, or of the rows if there "
+        "is only one (default: %(default)s)",
     )
     judging.add_argument(
         "--refit",
         action=argparse.BooleanOptionalAction,
-        help="once judged, learn again from all rows (default: yes; with --paper: no)",
+        help="learn again from all rows after evaluation (default: yes; with --paper: no)",
     )
 
 

@@ -18,8 +18,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="replay",
-        description="Runs a learned tree over recorded demonstrations, as fast as it can, and "
-        "shows where it would have done something else.",
+        description="Runs a learned tree over recorded demonstrations and shows where it would "
+        "have acted differently.",
     )
     parser.add_argument("tree", type=Path, metavar="TREE", help="tree.json of a learned tree")
     add_input_options(parser)
@@ -28,13 +28,13 @@ def main(arguments: list[str] | None = None) -> None:
         type=int,
         default=10,
         metavar="N",
-        help="how many disagreements to list (default: %(default)s)",
+        help="maximum number of disagreements to list (default: %(default)s)",
     )
     parser.add_argument(
         "--btlog",
         type=Path,
         metavar="FILE",
-        help="also write what each node did in each row, as a .btlog for Groot2",
+        help="also write the status of each node in each row to this .btlog file for Groot2",
     )
     parsed = parse(parser, arguments)
     run(lambda: _replay(parsed), "replay")

@@ -23,9 +23,9 @@ def main(arguments: list[str] | None = None) -> None:
         "learned",
         type=Path,
         metavar="DIR",
-        help="what `learn` wrote; without options, what can be changed is listed",
+        help="directory that `learn` wrote; without options, lists what can be changed",
     )
-    parser.add_argument("--level", type=int, metavar="K", help="take this pruning level")
+    parser.add_argument("--level", type=int, metavar="K", help="switch to this pruning level")
     parser.add_argument(
         "--attach",
         action="append",
@@ -43,7 +43,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument(
         "--psa-choice",
         choices=[choice.value for choice in PsaChoice],
-        help="turn all Parallel/Selector nodes into this",
+        help="replace all Parallel/Selector nodes by this kind of node",
     )
     parser.add_argument(
         "--out",

@@ -159,7 +159,7 @@ def add_seed(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="equal numbers give equal files (default: %(default)s)",
+        help="random seed; the same seed gives the same files (default: %(default)s)",
     )
 
 
@@ -170,9 +170,8 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
         nargs="+" if required else "*",
         type=_input,
         metavar="INPUT",
-        help="a rosbag2 bag (directory, .mcap or .db3), a recording of the recorder, a CSV table, "
-        "a directory of any of them, a pattern such as 'fleet/*', or @FILE with such an input in "
-        "each line",
+        help="a rosbag2 bag (directory, .mcap or .db3), a recording, a CSV table, a directory of "
+        "these, a pattern such as 'fleet/*', or @FILE with one input per line",
     )
     tables = parser.add_argument_group("CSV tables")
     tables.add_argument(
@@ -180,8 +179,8 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
         action="append",
         default=[],
         metavar="COLUMN",
-        help="column of the action; repeatable, each one then is a channel of its own, named "
-        "after its column (default: last)",
+        help="column with the actions; repeatable: each column becomes a channel named after it "
+        "(default: the column called action, else the last one)",
     )
     tables.add_argument(
         "--no-header", action="store_true", help="the first line is a row; columns are x0, x1, …"
@@ -190,8 +189,8 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
         "--rows",
         type=word_of(RowKind),
         metavar="|".join(kind.value for kind in RowKind),
-        help="what a row is: an action from its beginning to its end, or a sample of one that is "
-        "held (default: event where a column LABEL.outcome says how actions ended, else sample)",
+        help="what a row is: a whole action, or a sample of an action that is held (default: "
+        "event if a column LABEL.outcome says how actions ended, else sample)",
     )
     bags = parser.add_argument_group("bags")
     bags.add_argument(
@@ -199,15 +198,15 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
         action="append",
         default=[],
         metavar="TOPIC[:FIELD,…]",
-        help="Float64MultiArray topic, with the names of its values; repeatable (default: the "
-        "only one, named by its layout's labels)",
+        help="Float64MultiArray topic with the state, and names for its values; repeatable "
+        "(default: the only one, with the names in its layout labels)",
     )
     bags.add_argument(
         "--action-topic",
         action="append",
         default=[],
         metavar="TOPIC",
-        help="String topic of actions; repeatable (default: the only one)",
+        help="String topic with the actions; repeatable (default: the only one)",
     )
     bags.add_argument(
         "--sample-rate",
@@ -219,11 +218,13 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
         "--robot",
         type=Path,
         metavar="FILE",
-        help="robot file that says where features and actions are in messages of any type, instead "
-        "of topics (docs/robot_file.md)",
+        help="robot file that says where features and actions are in messages of any type; "
+        "replaces the topic options (docs/robot_file.md)",
     )
     bags.add_argument(
-        "--skip-bad", action="store_true", help="leave out malformed messages instead of refusing"
+        "--skip-bad",
+        action="store_true",
+        help="skip malformed messages instead of refusing the bag",
     )
     _add_plan(parser)
 
@@ -236,35 +237,37 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="leave out demonstrations: what inspect calls one, a path, a pattern such as "
-        "'run_?.csv', or @FILE with such a line for each; repeatable",
+        help="leave out demonstrations: a name that inspect prints, a path, a pattern such as "
+        "'run_?.csv', or @FILE with one of these per line; repeatable",
     )
     cache = many.add_mutually_exclusive_group()
     cache.add_argument(
         "--cache",
         type=directory,
         metavar="DIR",
-        help="keep what is read of each input there, so that only what is new is read the next "
-        "time (default: rebt_ros in the user's cache, $XDG_CACHE_HOME or ~/.cache)",
+        help="cache what is read here, so that only new inputs are read the next time (default: "
+        "rebt_ros in $XDG_CACHE_HOME or ~/.cache)",
     )
-    cache.add_argument("--no-cache", action="store_true", help="read everything, and keep nothing")
+    cache.add_argument(
+        "--no-cache", action="store_true", help="read everything again and cache nothing"
+    )
     many.add_argument(
         "--jobs",
         type=int,
         metavar="N",
-        help="processes that read; -1: one per processor (default: one per processor where that "
-        "pays)",
+        help="number of reading processes; -1 for one per processor (default: one per processor "
+        "if that saves time)",
     )
     many.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="let the workers of the Dask cluster with this scheduler read, such as "
-        "tcp://127.0.0.1:8786; they need the same paths, and the package distributed",
+        help="scheduler of a Dask cluster whose workers read the inputs, such as "
+        "tcp://127.0.0.1:8786; workers need the same paths and the package distributed",
     )
     many.add_argument(
         "--strict",
         action="store_true",
-        help="refuse an input that cannot be read, instead of setting it aside where others can",
+        help="stop at an input that cannot be read, instead of setting it aside",
     )
 
 

@@ -55,7 +55,7 @@ def _parser() -> argparse.ArgumentParser:
         type=int,
         default=TICKS,
         metavar="N",
-        help="ticks of the tree (default: %(default)s)",
+        help="number of ticks (default: %(default)s)",
     )
     add_seed(parser)
     parser.add_argument(
@@ -63,14 +63,15 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         default=RUNNING_CHANCE,
         metavar="SHARE",
-        help="how often a tried action is not done yet; below 1 (default: %(default)s)",
+        help="probability that an action is still running when ticked; below 1 (default: "
+        "%(default)s)",
     )
     parser.add_argument(
         "--repeats",
         type=int,
         default=REPEATS,
         metavar="N",
-        help="how often Repeaters run their children (default: %(default)s)",
+        help="number of times that Repeaters run their children (default: %(default)s)",
     )
     parser.add_argument(
         "--out",

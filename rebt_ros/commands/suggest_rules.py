@@ -17,15 +17,16 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point."""
     parser = argparse.ArgumentParser(
         prog="suggest-rules",
-        description="Writes what the demonstrations never did as rules, the strongest first: keep "
-        "those that must hold, in a file for check, the learner and the executor.",
+        description="Prints what the demonstrations never did as rules, the strongest first. "
+        "Keep those that must hold in a rules file for check, the learner and the "
+        "executor.",
     )
     parser.add_argument(
         "--most",
         type=int,
         default=10,
         metavar="N",
-        help="how many for each channel (default: %(default)s)",
+        help="maximum number of rules per channel (default: %(default)s)",
     )
     add_input_options(parser)
     parsed = parse(parser, arguments)

@@ -76,23 +76,26 @@ def _parser() -> argparse.ArgumentParser:
         "--levels",
         type=Path,
         metavar="DIR",
-        help="all pruning levels of what 'learn --out DIR' or a learner wrote; DIR/trials.json "
-        "then says how often each succeeded, and the studio shows it",
+        help="all pruning levels in the output directory of learn or of a learner; the results "
+        "are kept in DIR/trials.json, for the studio",
     )
     parser.add_argument(
         "--episodes",
         type=int,
         default=_EPISODES,
         metavar="N",
-        help="episodes that each of the last trees drives in all; the others drop out earlier "
+        help="total number of episodes for each of the last trees; others drop out earlier "
         "(default: %(default)s)",
     )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="also write all results as JSON")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE", help="also write all results to this file as JSON"
+    )
     parser.add_argument(
         "--publish",
         action="store_true",
-        help="publish the winner, and stay as its publisher until Ctrl-C, so that nodes which "
-        "start later hear of it; otherwise what was published before is published again",
+        help="publish the winner at the end, and keep publishing it until Ctrl-C, so that nodes "
+        "that start later receive it; by default, the tree from before the trial is "
+        "published again",
     )
     _add_outcome(parser)
     _add_world(parser)
@@ -115,7 +118,9 @@ def _add_outcome(parser: argparse.ArgumentParser) -> None:
         "or false, or JSON",
     )
     outcome.add_argument(
-        "--outcome-field", metavar="NAME", help="boolean field of a JSON object that says it"
+        "--outcome-field",
+        metavar="NAME",
+        help="boolean field of the JSON object that holds the outcome",
     )
     outcome.add_argument(
         "--ask", action="store_true", help="a person at this terminal says how it went"
@@ -134,21 +139,21 @@ def _add_world(parser: argparse.ArgumentParser) -> None:
     world.add_argument(
         "--reset-service",
         metavar="SERVICE",
-        help="std_srvs/Trigger that puts robot and world at a start, called before each episode",
+        help="std_srvs/Trigger service that resets robot and world; called before each episode",
     )
     world.add_argument(
         "--start-parameter",
         metavar="NODE/PARAMETER",
-        help="integer parameter that says at which start the next reset puts them, so that all "
-        "trees drive from the same ones",
+        help="integer parameter that selects the start for the next reset, so that all trees "
+        "drive from the same starts",
     )
     world.add_argument(
         "--first-start",
         type=int,
         default=0,
         metavar="N",
-        help="with --start-parameter: the first start, from which the others count on "
-        "(default: %(default)s)",
+        help="with --start-parameter: the first start; later ones count up from it (default: "
+        "%(default)s)",
     )
 
 

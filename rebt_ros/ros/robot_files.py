@@ -30,8 +30,8 @@ def robot_file(declare: Parameters) -> RobotFile | None:
     path = declare.text(
         "robot_file",
         "",
-        "Robot file that says where features and actions are in messages of any type, and what "
-        "labels do; empty for none.",
+        "Robot file (docs/robot_file.md): where features and actions are in the messages of the "
+        "robot, and what each label does. Empty for none.",
     )()
     robot = read_robot_file(at_home("robot_file", path)) if path else None
     # Rules that cannot be read are found before anything is recorded or run.

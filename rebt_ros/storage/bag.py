@@ -79,7 +79,7 @@ def read_bag(
         with with_notes(bag):
             kinds = kinds_of(bag)
             if not kinds:
-                raise InputError(f"{path} holds no messages: record state and action topics first.")
+                raise InputError(no_messages(path, bag, "state and action topics"))
             states = _chosen(path, kinds, names, STATE_TYPE, "state")
             actions = _chosen(path, kinds, action_topics, ACTION_TYPE, "action", taken=states)
         topics = (
@@ -449,6 +449,13 @@ def differences(bag: BagFiles, wanted: set[Topic]) -> Iterator[str]:
                     f"the input says that {topic[0]} has {stated} messages, and "
                     f"{bag.found[topic]} were found"
                 )
+
+
+def no_messages(path: Path, bag: BagFiles, topics: str) -> str:
+    """What to say of a bag without messages, which may be due to damage."""
+    if bag.is_incomplete:
+        return f"{path} holds no message that can be read: record {topics} again."
+    return f"{path} holds no messages: record {topics} first."
 
 
 def kinds_of(bag: BagFiles) -> dict[str, dict[str, int]]:

@@ -24,6 +24,7 @@ from rebt_ros.storage.bag import (
     listed,
     messages_of,
     named,
+    no_messages,
     unpacked,
     with_notes,
 )
@@ -68,7 +69,7 @@ def read_robot_bag(
         with with_notes(bag):
             kinds = kinds_of(bag)
             if not kinds:
-                raise InputError(f"{path} holds no messages: record the robot's topics first.")
+                raise InputError(no_messages(path, bag, "the robot's topics"))
             wanted = {
                 topic: bind(robot, name, topic[1], types)
                 for topic, name in _chosen(path, kinds, robot).items()

@@ -149,6 +149,14 @@ def test_where_the_clock_was_set_back_messages_stay_in_their_order(
     assert len(sampled) <= len(MESSAGES)
 
 
+def test_a_bag_of_which_nothing_is_left_is_to_be_recorded_again(tmp_path: Path) -> None:
+    path = mcap.write(tmp_path / "bag.mcap", MESSAGES, per_chunk=1000)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:300] + bytes(len(whole) - 300))
+    with pytest.raises(InputError, match=r"no message that can be read: record .* again .*damaged"):
+        read_bag(path)
+
+
 def test_topics_one_behind_the_other_and_single_late_messages_are_put_in_order(
     tmp_path: Path,
 ) -> None:

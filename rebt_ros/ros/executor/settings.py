@@ -87,41 +87,41 @@ def declare_settings(node: Node) -> ExecutorSettings:
     """
     declare = Parameters(node)
     tree_file = declare.text(
-        "tree_file", "", "Behavior tree document to begin with; empty for none."
+        "tree_file", "", "Behavior tree document to start with; empty for none."
     )()
     rules_file = declare.text(
         "rules_file",
         "",
-        "File of rules (docs/rules.md): trees that are not proven to keep them are refused; empty "
-        "for none.",
+        "Rules file (docs/rules.md): a tree is accepted only if it is proven to keep these "
+        "rules. Empty for none.",
     )()
     learner = declare.text(
         "learner",
         "",
-        "Node whose trees are followed, such as /robot/learner, where there are several; empty to "
-        "follow whoever publishes on behavior_tree.",
+        "Learner to follow, such as /robot/learner, if there are several; empty to follow every "
+        "publisher of behavior_tree.",
     )().rstrip("/")
     rate = declare.number(
         "rate",
         20.0,
-        "Ticks per second; the recording's sample rate if the tree has lagged features.",
+        "Ticks per second. If the tree has lagged features, use the recording's sample rate.",
         0.1,
         1000.0,
     )()
     state_timeout = declare.number(
-        "state_timeout", 0.5, "How long a state message is good for (seconds).", 0.001, 3600.0
+        "state_timeout", 0.5, "How long a state message stays valid (seconds).", 0.001, 3600.0
     )()
     publish = declare.text(
         "publish",
         "every_tick",
-        "When to send the command.",
+        "When to send the command: at every tick, or only when it changes.",
         choices=("every_tick", "on_change"),
     )()
     tick_on = declare.text(
         "tick_on",
         "timer",
-        "When to tick: timer, or state to tick when a state message arrives, and at the rate while "
-        "none does.",
+        "When to tick: timer, or state to tick when a state message arrives, and at the rate "
+        "while none arrives.",
         choices=("timer", "state"),
     )()
     if learner:
@@ -135,22 +135,20 @@ def declare_settings(node: Node) -> ExecutorSettings:
         tick_on_state=tick_on == "state",
         state_timeout=nanoseconds(state_timeout),
         state_topic=declare.text(
-            "state_topic", "state", "State topic of a tree that was learned from a table."
+            "state_topic", "state", "State topic for a tree learned from a table."
         )(),
         every_tick=publish == "every_tick",
-        enabled=declare.flag(
-            "enabled", False, "Whether to command the robot from the start, see ~/enable."
-        )(),
+        enabled=declare.flag("enabled", False, "Command the robot from the start; see ~/enable.")(),
         action_result_topic=declare.text(
             "action_result_topic",
             "",
-            "String topic that says 'success' or 'failure' (or 'label:success') when an action "
-            "has ended; empty if an action is done once its command is out.",
+            "String topic that reports 'success' or 'failure' (or 'label:success') when an "
+            "action ends. If empty, an action counts as done once its command is sent.",
         )(),
         halt_action=declare.text(
             "halt_action",
             "",
-            "Command that is sent once when the tree is halted, such as 'stop'; empty for none.",
+            "Command to send once when the tree is halted, such as 'stop'; empty for none.",
         )(),
         takeover=_takeover(declare),
         novelty=_novelty(declare),
@@ -174,14 +172,14 @@ def _takeover(declare: Parameters) -> TakeoverSettings:
     topics = declare.texts(
         "takeover_topics",
         ["action"],
-        "String topics on which a person takes over; a tree's channel of that name learns from "
-        "them what was done.",
+        "String topics on which a person takes over. The channel of the same name continues with "
+        "the history that they give.",
     )()
     timeout = declare.number(
         "takeover_timeout",
         1.0,
-        "How long after the last message of a person the tree rests (seconds); 0.0: nobody can "
-        "take over.",
+        "How long the tree pauses after a person's last message (seconds); 0.0 to disable "
+        "takeovers.",
         0.0,
         3600.0,
     )()
@@ -192,15 +190,15 @@ def _novelty(declare: Parameters) -> NoveltySettings:
     mode = declare.text(
         "novelty",
         Novelty.WARN.value,
-        "What to do in a state outside what was shown: hold halts the tree until a person takes "
-        "over.",
+        "What to do in a state unlike any that was shown; hold halts the tree until a person "
+        "takes over.",
         choices=[one.value for one in Novelty],
     )()
     margin = declare.number(
         "novelty_margin",
         0.1,
-        "How far a feature may lie outside of what was shown in such states, as a share of all "
-        "that was shown of it.",
+        "How far a feature may lie outside the range shown in similar states, as a share of its "
+        "whole range.",
         0.0,
         100.0,
     )()
@@ -211,21 +209,20 @@ def _watching(declare: Parameters) -> WatchingSettings:
     port = declare.integer(
         "groot2_port",
         0,
-        "TCP port on which Groot2's monitor may watch the tree, from this machine only, such as "
-        "1667; 0 for none.",
+        "TCP port, such as 1667, on which Groot2 on this machine can monitor the tree; 0 for none.",
         0,
         65535,
     )()
     directory = declare.text(
         "btlog_directory",
         "",
-        "Directory for a .btlog of each tree that runs, to be replayed in Groot2; empty for none.",
+        "Directory for .btlog files, one per tree, which Groot2 can replay; empty for none.",
     )()
     topics = declare.flag(
         "status_topics",
         False,
-        "Whether the tree is published as XML on ~/tree_xml, and the statuses of its nodes on "
-        "~/behavior_tree_log where nav2_msgs is installed, as for Foxglove.",
+        "Publish the tree as XML on ~/tree_xml and, if nav2_msgs is installed, the statuses of "
+        "its nodes on ~/behavior_tree_log, for example for Foxglove.",
     )()
     return WatchingSettings(
         port, at_home("btlog_directory", directory) if directory else None, topics

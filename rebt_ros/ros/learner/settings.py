@@ -86,16 +86,16 @@ def declare_settings(node: Node) -> LearnerSettings:
         demonstrations=declare.directory(
             "demonstrations",
             "demonstrations",
-            "Directory of the recordings to learn from; ~ is your home.",
+            "Directory with the recordings to learn from; ~ is your home directory.",
             fixed=False,
         ),
         output=declare.directory(
-            "output", "learned", "Directory that tree.json is written to.", fixed=False
+            "output", "learned", "Directory for tree.json and all other output.", fixed=False
         ),
         timeout=declare.number(
             "relearn_timeout",
             0.0,
-            "Learning that takes longer is stopped (seconds); 0.0 for no limit.",
+            "Time limit for learning (seconds); 0.0 for no limit.",
             0.0,
             1e6,
             fixed=False,
@@ -103,7 +103,8 @@ def declare_settings(node: Node) -> LearnerSettings:
         relearn_after=declare.integer(
             "relearn_after",
             0,
-            "Learn anew, without a call, once so many demonstrations have ended; 0 for never.",
+            "Relearn automatically after this many new demonstrations; 0 to relearn only on "
+            "request.",
             0,
             100_000,
             fixed=False,
@@ -111,7 +112,7 @@ def declare_settings(node: Node) -> LearnerSettings:
         least_agreement=declare.number(
             "min_agreement",
             0.0,
-            "Least own-history agreement with held-out rows of a tree that is published.",
+            "Lowest own-history agreement with held-out rows at which a tree is published.",
             0.0,
             1.0,
             fixed=False,
@@ -119,13 +120,14 @@ def declare_settings(node: Node) -> LearnerSettings:
         only_better=declare.flag(
             "keep_if_better",
             False,
-            "Whether the published tree stays where it agrees more with the same held-out rows.",
+            "Keep the published tree if it agrees with the same held-out rows better than the "
+            "new one.",
             fixed=False,
         ),
         kept_trees=declare.integer(
             "kept_trees",
             20,
-            "How many of the trees that were published are kept in OUTPUT/trees, for ~/rollback.",
+            "How many published trees to keep in OUTPUT/trees, for ~/rollback.",
             2,
             100_000,
             fixed=False,
@@ -134,11 +136,12 @@ def declare_settings(node: Node) -> LearnerSettings:
         binary=declare.texts(
             "binary_features",
             [],
-            "Features to take for binary; others are if they hold nothing but 0 and 1.",
+            "Features to treat as binary. Other features are binary if all their values are 0 or "
+            "1.",
             fixed=False,
         ),
         categorical=declare.texts(
-            "categorical_features", [], "Features whose numbers are categories.", fixed=False
+            "categorical_features", [], "Features whose numbers stand for categories.", fixed=False
         ),
         options={**_pruning(declare), **_form(declare), **_rows(declare)},
     )
@@ -151,8 +154,8 @@ def _rules(declare: Parameters) -> RuleSettings:
     file = declare.text(
         "rules_file",
         "",
-        "File of rules (docs/rules.md): trees that are not proven to keep them are not published; "
-        "empty for none.",
+        "Rules file (docs/rules.md): a tree is published only if it is proven to keep these "
+        "rules. Empty for none.",
         fixed=False,
     )
     return RuleSettings(
@@ -160,13 +163,13 @@ def _rules(declare: Parameters) -> RuleSettings:
         declare.flag(
             "repair",
             False,
-            "Whether guards are put into a tree that breaks a rule, instead of not publishing it.",
+            "Add guards to a tree that breaks a rule, instead of refusing to publish it.",
             fixed=False,
         ),
         declare.flag(
             "action_results",
             False,
-            "Whether the executor has an action_result_topic, so that actions may fail.",
+            "Set this if the executor has an action_result_topic, so that actions can fail.",
             fixed=False,
         ),
     )
@@ -175,12 +178,12 @@ def _rules(declare: Parameters) -> RuleSettings:
 def _pruning(declare: Parameters) -> dict[str, Callable[[], object]]:
     """How large the tree becomes."""
     max_depth = declare.integer(
-        "max_depth", 0, "Splits on the longest path; 0 for no limit.", 0, 100, fixed=False
+        "max_depth", 0, "Maximum depth of the decision tree; 0 for no limit.", 0, 100, fixed=False
     )
     ccp_alpha = declare.number(
         "ccp_alpha",
         -1.0,
-        "Complexity parameter of the pruning, 0.0 prunes nothing; -1.0 to choose it by "
+        "Complexity parameter for pruning; 0.0 prunes nothing, and -1.0 chooses it by "
         "cross-validation.",
         -1.0,
         1e9,
@@ -189,7 +192,7 @@ def _pruning(declare: Parameters) -> dict[str, Callable[[], object]]:
     level = declare.integer(
         "level",
         -1,
-        "Number of the pruning level, 0 prunes nothing, instead of ccp_alpha; -1 for none.",
+        "Pruning level to use instead of ccp_alpha; 0 prunes nothing, and -1 sets no level.",
         -1,
         1_000_000,
         fixed=False,
@@ -206,8 +209,8 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
     history = declare.text(
         "history",
         "auto",
-        "What the tree may test of what was done before: previous (action), last (action taken, as "
-        "in the paper) or none; auto: the previous action where it makes the rows simpler to "
+        "What the tree may test about earlier actions: the previous action, the paper's last "
+        "action taken, or none. auto: the previous action, if it makes the rows simpler to "
         "explain.",
         choices=("auto", *(kind.value for kind in History)),
         fixed=False,
@@ -215,14 +218,15 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
     units = declare.texts(
         "units",
         [],
-        "Units of features, such as left=m: features of different units are not compared.",
+        "Units of features, such as left=m. Features with different units are not compared with "
+        "each other.",
         fixed=False,
     )
     return {
         "delta": declare.number(
             "delta",
             0.3,
-            "Threshold δ of actions that are close enough to stand in one PSA node.",
+            "Threshold δ for putting actions with similar shares into one PSA node.",
             0.0,
             1.0,
             fixed=False,
@@ -230,14 +234,14 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
         "psa": declare.text(
             "psa",
             "auto",
-            "Whether PSA nodes stand in the tree; auto: where they raise agreement.",
+            "Whether to use PSA nodes. auto: where they raise agreement.",
             choices=_USES,
             fixed=False,
         ),
         "root": declare.text(
             "root",
             "selector",
-            "Root node: selector, smaller, or parallel, as in the paper.",
+            "Root node: selector makes smaller trees, parallel is what the paper uses.",
             choices=[root.value for root in Root],
             fixed=False,
         ),
@@ -245,7 +249,7 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
         "differences": declare.text(
             "differences",
             "auto",
-            "Whether the tree may compare two features, as in left < right; auto: where that makes "
+            "Whether the tree may compare two features, as in left < right. auto: if that makes "
             "it a quarter smaller at the same agreement.",
             choices=_USES,
             fixed=False,
@@ -253,8 +257,8 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
         "sums": declare.text(
             "sums",
             "auto",
-            "Whether the tree may weigh features against each other, as in "
-            "angle + 0.4 × spin > 0.02; auto: where that takes less to describe what was shown.",
+            "Whether the tree may test weighted sums of features, as in angle + 0.4 × spin > "
+            "0.02. auto: where they describe the demonstrations more briefly.",
             choices=_USES,
             fixed=False,
         ),
@@ -262,19 +266,19 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
         "simplest": declare.flag(
             "simplest",
             True,
-            "Whether the simplest of the trees that fit the rows is searched for, up to 30 leaves.",
+            "Search for the simplest tree that fits the rows, up to 30 leaves.",
             fixed=False,
         ),
         "leave_out_mistakes": declare.flag(
             "leave_out_mistakes",
             True,
-            "Whether rows that look like mistakes are left out of what is learned from.",
+            "Ignore rows that look like mistakes.",
             fixed=False,
         ),
         "readable_thresholds": declare.flag(
             "readable_thresholds",
             True,
-            "Whether thresholds are moved to round values within the gaps between rows.",
+            "Move thresholds to round values within the gaps between rows.",
             fixed=False,
         ),
     }
@@ -300,8 +304,8 @@ def _rows(declare: Parameters) -> dict[str, Callable[[], object]]:
     reaction_time = declare.number(
         "reaction_time",
         -1.0,
-        "How late the demonstrator acted, to be undone before learning (seconds); -1.0 to read it "
-        "off demonstrations that were recorded with a sample rate.",
+        "The demonstrator's reaction time, which is corrected before learning (seconds); -1.0 to "
+        "estimate it from demonstrations recorded with a sample rate.",
         -1.0,
         5.0,
         fixed=False,
@@ -309,32 +313,41 @@ def _rows(declare: Parameters) -> dict[str, Callable[[], object]]:
     return {
         "reaction_time": lambda: None if (late := reaction_time()) < 0 else late,
         "test_fraction": declare.number(
-            "test_fraction", 0.25, "Share to hold out for judging.", 0.0, 0.9, fixed=False
+            "test_fraction",
+            0.25,
+            "Share of the rows or demonstrations to hold out for evaluation.",
+            0.0,
+            0.9,
+            fixed=False,
         ),
-        "refit": declare.flag(
-            "refit", True, "Whether to learn from all rows once it is judged.", fixed=False
-        ),
+        "refit": declare.flag("refit", True, "Learn from all rows after evaluation.", fixed=False),
         "exact": declare.flag(
             "exact",
             False,
-            "Whether trees grow on all rows where there are more than 100000, not on a sample.",
+            "Grow trees on all rows even if there are more than 100000, instead of on a sample.",
             fixed=False,
         ),
         "lags": declare.integer(
             "lags",
             0,
-            "How many rows each feature looks back; record with a sample rate for it.",
+            "Number of earlier rows whose values are features, too; needs recordings with a "
+            "sample rate.",
             0,
             LARGEST_LAG,
             fixed=False,
         ),
         "random_state": declare.integer(
-            "random_state", 0, "Decides between equally good splits.", 0, 2**32 - 1, fixed=False
+            "random_state",
+            0,
+            "Seed that decides between equally good splits.",
+            0,
+            2**32 - 1,
+            fixed=False,
         ),
         "upsample": declare.text(
             "upsample",
             "none",
-            "Whether rows are made up for rare actions; svm-smote needs imbalanced-learn.",
+            "Whether to synthesize rows for rare actions; svm-smote needs imbalanced-learn.",
             choices=[upsampling.value for upsampling in Upsampling],
             fixed=False,
         ),

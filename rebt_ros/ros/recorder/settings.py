@@ -40,7 +40,7 @@ class RecorderSettings:
     sample_rate: float | None
     """Rows per second while an action holds; None for a row per action message."""
     recording: bool
-    """Whether to record from the start."""
+    """Record from the start."""
     best_effort: bool
     """Whether states are subscribed to as sensor data are."""
     reorder_window: int
@@ -72,8 +72,8 @@ def declare_settings(node: Node) -> RecorderSettings:
     fields = declare.texts(
         "state_fields",
         [],
-        "Names of the values of state topics, each entry as in 'state:front,left,right'; "
-        "where a topic has none, its messages' layout labels name them, else their index.",
+        "Names for the values of state topics, such as 'state:front,left,right'. By default, the "
+        "layout labels of the messages name them, or else their index.",
     )()
     sample_rate = declare.number(
         "sample_rate",
@@ -85,33 +85,33 @@ def declare_settings(node: Node) -> RecorderSettings:
     reliability = declare.text(
         "state_qos",
         "reliable",
-        "How to subscribe to states: sensor_data also hears best-effort publishers.",
+        "How to subscribe to states: sensor_data also receives from best-effort publishers.",
         choices=("reliable", "sensor_data"),
     )()
     window = declare.number(
         "reorder_window",
         0.05,
-        "How long to wait for messages that belong before others (seconds).",
+        "How long to wait for messages that arrive out of order (seconds).",
         0.0,
         1.0,
     )()
     state_wait = declare.number(
         "state_wait",
         5.0,
-        "How long an action waits at most for states that were sent before it, where states have "
-        "just stopped to come (seconds).",
+        "Longest time that an action waits for states sent before it, if states have just "
+        "stopped arriving (seconds).",
         0.0,
         60.0,
     )()
     pair_by = declare.text(
         "pair_by",
         PairBy.AUTO.value,
-        "What says which state an action belongs to: when they were sent, when they were "
-        "received, or auto, for when they were sent if all publishers are on this machine.",
+        "How to pair an action with a state: by the time they were sent or received. auto: by "
+        "the time sent, if all publishers are on this machine.",
         choices=[one.value for one in PairBy],
     )()
     actions = declare.texts(
-        "action_topics", ["action"], "String topics; each is a channel of its own."
+        "action_topics", ["action"], "String topics of actions; each is a separate channel."
     )()
     robot = robot_file(declare)
     if robot is not None:
@@ -122,7 +122,9 @@ def declare_settings(node: Node) -> RecorderSettings:
         robot=robot,
         executor=_executor_topics(declare),
         demonstrations=declare.directory(
-            "demonstrations", "demonstrations", "Directory of the recordings; ~ is your home."
+            "demonstrations",
+            "demonstrations",
+            "Directory for the recordings; ~ is your home directory.",
         )(),
         sample_rate=sample_rate or None,
         recording=declare.flag("recording", True, "Whether to record from the start.")(),
@@ -134,8 +136,8 @@ def declare_settings(node: Node) -> RecorderSettings:
         sync_period=declare.number(
             "sync_period",
             0.0,
-            "How often rows are made to survive a loss of power (seconds); 0.0 for only when a "
-            "demonstration ends.",
+            "Interval for flushing rows to disk, so that they survive a power cut (seconds); 0.0 "
+            "to flush only when a demonstration ends.",
             0.0,
             3600.0,
         )(),
@@ -166,14 +168,14 @@ def _executor_topics(declare: Parameters) -> ExecutorTopics:
         commands=declare.text(
             "command_topic",
             "command",
-            "String topic of the executor's commands, as a correction knows what they did before "
-            "it (with several action_topics: a topic below it for each); empty for none.",
+            "String topic of the executor's commands, which give a correction its history. With "
+            "several action_topics, there is one topic below it for each. Empty for none.",
         )(),
         driving=declare.text(
             "driving_topic",
             "executor/driving",
-            "Bool topic on which the executor says whether it drives: what a person does while it "
-            "drives is a demonstration of its own; empty for none.",
+            "Bool topic on which the executor says whether it is driving. What a person does "
+            "while it drives becomes a separate demonstration. Empty for none.",
         )(),
     )
 

@@ -30,7 +30,7 @@ class DemonstratorSettings:
     """What the demonstrator was started with."""
 
     enabled: bool
-    """Whether to drive from the start."""
+    """Drive from the start."""
     plain: bool
     """Whether the robot speaks arrays of numbers and words."""
 
@@ -47,8 +47,8 @@ def declare_settings(node: Node) -> DemonstratorSettings:
         plain=declare.flag(
             "plain",
             False,
-            "Whether the robot speaks arrays of numbers and words, instead of the messages of real "
-            "robots.",
+            "Set this if the robot publishes plain arrays and strings instead of the messages of "
+            "real robots.",
         )(),
     )
     declare.refuse_others()

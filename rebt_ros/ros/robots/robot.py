@@ -41,7 +41,7 @@ class RobotSettings:
     rate: float
     """Time steps per simulated second."""
     speedup: float
-    """Simulated seconds per second, at most."""
+    """Maximum number of simulated seconds per second."""
     lockstep: bool
     """Whether time stands still until a state is answered."""
     time_limit: float
@@ -60,7 +60,7 @@ def declare_settings(node: Node) -> RobotSettings:
     command_topics = declare.texts(
         "command_topics",
         ["command", "action"],
-        "String topics to obey where it is plain; the last word counts.",
+        "String topics to obey in plain mode; the latest message counts.",
     )()
     if not command_topics:
         raise OptionError("parameter 'command_topics' is empty: name at least one topic.")
@@ -68,7 +68,7 @@ def declare_settings(node: Node) -> RobotSettings:
         plain=declare.flag(
             "plain",
             False,
-            "Whether to speak arrays of numbers and words, instead of the messages of real robots.",
+            "Publish plain arrays and strings instead of the messages of real robots.",
         )(),
         command_topics=command_topics,
         rate=declare.number("rate", 20.0, "Time steps per simulated second (Hz).", 5.0, 200.0)(),
@@ -78,24 +78,29 @@ def declare_settings(node: Node) -> RobotSettings:
         lockstep=declare.flag(
             "lockstep",
             False,
-            "Whether time stands still until the latest state is answered by a command, so that a "
-            "busy computer slows the simulation down instead of delaying the commands.",
+            "Stop time until a command answers the latest state, so that a busy computer slows "
+            "the simulation down instead of delaying commands.",
         )(),
         time_limit=declare.number(
-            "time_limit", 60.0, "When a run is lost (simulated seconds).", 1.0, 3600.0
+            "time_limit",
+            60.0,
+            "Time after which a run counts as lost (simulated seconds).",
+            1.0,
+            3600.0,
         )(),
         command_timeout=declare.number(
             "command_timeout",
             0.5,
-            "When the robot stops for want of a command (simulated seconds; not in lockstep).",
+            "How long the robot obeys a command before it stops (simulated seconds; not in "
+            "lockstep).",
             0.01,
             60.0,
         )(),
         first_start=declare.integer(
             "first_start",
             0,
-            "Number of the first run's start, from which the others count on; a new value holds "
-            "from the next reset on.",
+            "Number of the start of the first run; later runs count up from it. A new value "
+            "takes effect at the next reset.",
             0,
             _LARGEST_START,
             fixed=False,

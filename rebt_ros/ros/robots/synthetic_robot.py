@@ -50,7 +50,7 @@ class SyntheticRobotSettings:
     repeats: int
     enabled: bool
     audience: int
-    """Subscribers that state and action must have each before the robot begins to act."""
+    """Number of subscribers that state and action must each have before the robot starts to act."""
 
 
 def declare_settings(node: Node) -> SyntheticRobotSettings:
@@ -60,25 +60,29 @@ def declare_settings(node: Node) -> SyntheticRobotSettings:
         OptionError: One makes no sense.
     """
     declare = Parameters(node)
-    path = declare.text("config", "", "Configuration file of an experiment; ~ is your home.")()
+    path = declare.text(
+        "config", "", "Configuration file of an experiment; ~ is your home directory."
+    )()
     settings = SyntheticRobotSettings(
         config=at_home("config", path),
-        seed=declare.integer("seed", 0, "Equal numbers give equal robots.", -_LARGEST, _LARGEST)(),
+        seed=declare.integer(
+            "seed", 0, "Random seed; the same seed gives the same robot.", -_LARGEST, _LARGEST
+        )(),
         rate=declare.number("rate", 10.0, "Ticks of the tree per second.", 0.1, 1000.0)(),
         ticks=declare.integer(
-            "ticks", 0, "Ticks until the robot stops for good; 0 for no end.", 0, _LARGEST
+            "ticks", 0, "Number of ticks after which the robot stops; 0 for no limit.", 0, _LARGEST
         )(),
         running_chance=declare.number(
             "running_chance",
             RUNNING_CHANCE,
-            "How often an action that is tried is not done yet; below 1.",
+            "Probability that an action is still running when ticked; below 1.",
             0.0,
             1.0,
         )(),
         repeats=declare.integer(
-            "repeats", REPEATS, "How often Repeaters run their children.", 1, _LARGEST
+            "repeats", REPEATS, "Number of times that Repeaters run their children.", 1, _LARGEST
         )(),
-        enabled=declare.flag("enabled", True, "Whether to act from the start.")(),
+        enabled=declare.flag("enabled", True, "Act from the start.")(),
         audience=declare.integer(
             "wait_for_subscribers",
             0,
