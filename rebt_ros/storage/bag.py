@@ -454,7 +454,7 @@ def differences(bag: BagFiles, wanted: set[Topic]) -> Iterator[str]:
 def no_messages(path: Path, bag: BagFiles, topics: str) -> str:
     """What to say of a bag without messages, which may be due to damage."""
     if bag.is_incomplete:
-        return f"{path} holds no message that can be read: record {topics} again."
+        return f"{path} holds no messages that can be read: record {topics} again."
     return f"{path} holds no messages: record {topics} first."
 
 

@@ -153,7 +153,7 @@ def test_a_bag_of_which_nothing_is_left_is_to_be_recorded_again(tmp_path: Path) 
     path = mcap.write(tmp_path / "bag.mcap", MESSAGES, per_chunk=1000)
     whole = path.read_bytes()
     path.write_bytes(whole[:300] + bytes(len(whole) - 300))
-    with pytest.raises(InputError, match=r"no message that can be read: record .* again .*damaged"):
+    with pytest.raises(InputError, match=r"no messages that can be read: .*again .*damaged"):
         read_bag(path)
 
 
