@@ -155,6 +155,10 @@ def test_the_live_tree_tells_statuses_values_and_the_command(page: Browser) -> N
         "return [...document.querySelectorAll('#live-tree .active.node')].map(n => n.dataset.path)"
     )
     assert active == ["root", "1", "1.1"]
+    hue = "return getComputedStyle(document.querySelector(arguments[0]))[arguments[1]]"
+    swatch = page.run(hue, "#command .swatch", "backgroundColor")
+    assert page.run(hue, f'{tree} [data-path="1.1"] .hue', "fill") == swatch
+    assert page.run(hue, f'{tree} [data-path="3"] .hue', "fill") != swatch
     shown = f"{values_at(QUIET)['target_bearing']:.3g}"
     page.sees(shown, f'{tree} [data-path="1.0"] .meter')
     page.sees(shown, '#live-values [data-key="target_bearing"]')

@@ -1,5 +1,6 @@
 // A behavior tree as a drawing that can be read, heard, and walked through with the keyboard.
 
+import { fillOf } from "./colors.js";
 import { element, setAttribute, setText, svg } from "./dom.js";
 import { arrange } from "./layout.js";
 import { features, holding, isNumeric, range, read, readText, share } from "./margins.js";
@@ -284,6 +285,8 @@ export class Tree {
       { class: `node kind-${node.kind}`, "data-path": node.path },
       svg("title", {}, node.explanation),
       svg("path", { class: "box", d: this.outline(node) }),
+      // The color that the action has everywhere else.
+      node.label === undefined ? null : svg("rect", { class: "hue", x: 0, y: node.height - 5, width: node.width, height: 5, rx: 2.5, fill: fillOf(node.label) }),
       text,
       svg("g", { class: "badge" }, svg("circle", { r: 9 }), sign),
     );
