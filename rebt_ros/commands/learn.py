@@ -65,6 +65,7 @@ _ASKED = (
     "sums",
     "reaction_time",
     "leave_out_mistakes",
+    "leave_out_conditions",
     "readable_thresholds",
     "simplest",
     "refit",
@@ -319,6 +320,14 @@ def _add_form(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         default=None,
         help="also learn from rows that look like mistakes",
+    )
+    form.add_argument(
+        "--keep-conditions",
+        dest="leave_out_conditions",
+        action="store_false",
+        default=None,
+        help="keep conditions that no shown row needs, so that the behavior tree does in every "
+        "state what the decision tree does",
     )
     form.add_argument(
         "--no-routines",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rebt_ros.arrays import IntArray
+from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.beyond_the_paper.needless_conditions import without_needless_conditions
 from rebt_ros.beyond_the_paper.priority_root import reduced_tree
 from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.demonstration.last_action import History
@@ -17,7 +19,7 @@ from rebt_ros.paper.rules import delta_close, dt_to_rules, dt_to_rules_psa, leaf
 
 
 def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.Node:
-    """The behavior tree of a decision tree.
+    """The behavior tree that does in every state what a decision tree does.
 
     Raises:
         OptionError: The root asked for makes no sense.
@@ -27,6 +29,44 @@ def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.
         return main_tree(dt_to_rules_psa(dt, delta) if psa else dt_to_rules(dt), options.root)
     rules = leaf_rules(dt, lambda leaf: delta_close(leaf, delta) if psa else (leaf.most_probable,))
     return reduced_tree(rules, options.reductions, options.root)
+
+
+def leaves_out_conditions(trained: TrainedTree, options: LearnOptions) -> bool:
+    """Whether a tree does without the conditions that no shown row needs.
+
+    What a condition on LAT means depends on the rule that asks, which no row tells.
+    """
+    reductions = options.reductions
+    by_priority = reductions is not None and reductions.priority and options.root is Root.SELECTOR
+    lat = trained.vocabulary.history is History.LAST
+    return options.leave_out_conditions and by_priority and not lat
+
+
+def convert_shown(
+    trained: TrainedTree, options: LearnOptions, shown: DemonstrationTable, *, psa: bool
+) -> nodes.Node:
+    """The behavior tree of a decision tree, without conditions that no shown row needs.
+
+    Args:
+        trained: The decision tree.
+        options: They say whether such conditions are left out.
+        shown: The rows that it was learned from.
+        psa: Whether PSA nodes stand in it.
+    """
+    tree = convert(trained, options, psa=psa)
+    if not leaves_out_conditions(trained, options):
+        return tree
+    return without_needless_conditions(tree, shown, kept_rows(trained, shown, psa=psa))
+
+
+def kept_rows(trained: TrainedTree, shown: DemonstrationTable, *, psa: bool) -> BoolArray:
+    """In which rows leaving out conditions changes nothing, shape (rows,).
+
+    A row that the decision tree gets wrong speaks for none of its conditions.
+    """
+    if psa:
+        return np.ones(len(shown), dtype=bool)
+    return np.asarray(trained.predict(shown) == shown.chosen)
 
 
 def own_history_choices(

@@ -23,7 +23,12 @@ from rebt_ros.errors import OptionError
 from rebt_ros.learning import evaluation
 from rebt_ros.learning.attaching import accept
 from rebt_ros.learning.chosen_policy import ChosenPolicy
-from rebt_ros.learning.conversion import convert, own_history_choices
+from rebt_ros.learning.conversion import (
+    convert,
+    convert_shown,
+    leaves_out_conditions,
+    own_history_choices,
+)
 from rebt_ros.learning.mistakes import without_mistakes
 from rebt_ros.learning.options import LearnOptions
 from rebt_ros.robot_file.robot_file import RobotFile
@@ -87,14 +92,43 @@ class Evidence:
         """
         table = self.learned_from
         trained = self.decision_tree_at(ccp_alpha)
-        tree = convert(trained, self.options, psa=self.psa)
-        judge = self.judge.at(ccp_alpha if judged_at is None else judged_at)
+        tree = convert_shown(trained, self.options, table, psa=self.psa)
         figures = replace(
-            _figures(self.table.where(self.held_out), judge, self.options, self.psa),
-            fidelity_mismatches=mismatches(self.table, trained, tree),
+            self._figures(self.judge.at(ccp_alpha if judged_at is None else judged_at)),
+            fidelity_mismatches=mismatches(table, trained, tree),
         )
         learned = as_learned(table, trained, tree, ccp_alpha, figures, self.options)
         return LevelTree(replace(learned, shown=(shown_rows(table, trained),)), trained)
+
+    def _figures(self, judge: TrainedTree) -> Figures:
+        """How well the behavior tree of a decision tree does on rows that it was not learned from.
+
+        Of fidelity nothing is said: that is about the tree that is published (see `mismatches`).
+        """
+        rows, options, psa = self.table.where(self.held_out), self.options, self.psa
+        if not len(rows):
+            return Figures(0, None, None, 0)
+        if leaves_out_conditions(judge, options):
+            known = ~self.held_out & (self.intended == self.table.chosen)
+            tree = convert_shown(judge, options, self.table.where(known), psa=psa)
+            forced = evaluation.teacher_forced_choices(tree, rows)
+            own = evaluation.own_history_choices(tree, rows)
+        elif psa or judge.vocabulary.history is History.LAST:
+            tree = convert(judge, options, psa=psa)
+            forced = evaluation.teacher_forced_choices(tree, rows)
+            own = own_history_choices(judge, rows, options, psa=psa)
+        else:
+            forced = judge.predict(rows)
+            own = own_history_choices(judge, rows, options, psa=psa)
+        shown = np.bincount(rows.chosen, minlength=len(rows.actions))
+        hits = np.bincount(rows.chosen[own == rows.chosen], minlength=len(rows.actions))
+        return Figures(
+            0,
+            evaluation.agreement(forced, rows),
+            evaluation.agreement(own, rows),
+            len(rows),
+            float(evaluation.mean_recall(hits, shown)),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,31 +239,6 @@ class Levels:
             figures = (judged.mean_recalls, judged.means, judged.standard_errors)
             return CrossValidated(*(float(figure[place]) for figure in figures))
         return None
-
-
-def _figures(
-    rows: DemonstrationTable, trained: TrainedTree, options: LearnOptions, psa: bool
-) -> Figures:
-    """How well the behavior tree of a decision tree does on rows that it was not learned from.
-
-    Of fidelity nothing is said: that is about the tree that is published (see `mismatches`).
-    """
-    if not len(rows):
-        return Figures(0, None, None, 0)
-    forced = trained.predict(rows)
-    if psa or trained.vocabulary.history is History.LAST:
-        tree = convert(trained, options, psa=psa)
-        forced = evaluation.teacher_forced_choices(tree, rows)
-    own = own_history_choices(trained, rows, options, psa=psa)
-    shown = np.bincount(rows.chosen, minlength=len(rows.actions))
-    hits = np.bincount(rows.chosen[own == rows.chosen], minlength=len(rows.actions))
-    return Figures(
-        0,
-        evaluation.agreement(forced, rows),
-        evaluation.agreement(own, rows),
-        len(rows),
-        float(evaluation.mean_recall(hits, shown)),
-    )
 
 
 def as_learned(

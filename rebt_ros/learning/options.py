@@ -91,6 +91,9 @@ class LearnOptions:
     leave_out_mistakes: bool = True
     """Whether rows that look like mistakes are left out of what is learned from, and out of what
     was done before other rows: of at most 5000 samples."""
+    leave_out_conditions: bool = True
+    """Whether conditions that no shown row needs are left out of rules in order of priority, unless
+    the tree tests LAT (see `needless_conditions`)."""
     reaction_time: float | None = None
     """How late the demonstrator acted (seconds), to be undone before learning; None to read it off
     the demonstrations if their rows are samples, and otherwise 0."""
@@ -217,6 +220,7 @@ class LearnOptions:
             simplest=False,
             readable_thresholds=False,
             leave_out_mistakes=False,
+            leave_out_conditions=False,
             reaction_time=0.0,
             exact=True,
             routines=False,
@@ -236,7 +240,15 @@ _ENUMS: Mapping[str, type[Enum]] = {
 #: Options that are numbers, and those that say yes or no.
 _NUMBERS = ("delta", "ccp_alpha", "test_fraction", "reaction_time")
 _WHOLE_NUMBERS = ("max_depth", "level", "random_state", "lags")
-_SWITCHES = ("refit", "simplest", "readable_thresholds", "leave_out_mistakes", "exact", "routines")
+_SWITCHES = (
+    "refit",
+    "simplest",
+    "readable_thresholds",
+    "leave_out_mistakes",
+    "leave_out_conditions",
+    "exact",
+    "routines",
+)
 #: Numbers that may be None.
 _LEFT_OPEN = frozenset({"ccp_alpha", "reaction_time", "max_depth", "level"})
 #: Those that are None where nobody chose.

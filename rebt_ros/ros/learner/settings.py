@@ -275,6 +275,12 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
             "Ignore rows that look like mistakes.",
             fixed=False,
         ),
+        "leave_out_conditions": declare.flag(
+            "leave_out_conditions",
+            True,
+            "Whether conditions that no shown row needs are left out of the tree.",
+            fixed=False,
+        ),
         "readable_thresholds": declare.flag(
             "readable_thresholds",
             True,

@@ -1,0 +1,227 @@
+"""Leaving out the conditions that no shown row needs.
+
+A decision tree parts the rows from the top, so that a rule repeats what was asked on the way to it:
+``charge`` while docked, with a low battery, *and with the target to the left*, because that was
+asked first and the robot was never shown docked otherwise.  Nothing that was shown speaks for the
+last condition.  Without it the rule does the same in every shown row, is shorter, and holds where
+it should.  This is the pruning of rules (Quinlan, 1987, "Simplifying decision trees"), of rules
+that stand in order of priority: each is reached only where all earlier ones failed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from rebt_ros.arrays import BoolArray, in_parts
+from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.prediction import States, history_columns
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Condition, Interval, Literal, Threshold
+
+
+def without_needless_conditions(
+    tree: nodes.Node, table: DemonstrationTable, shown: BoolArray | None = None
+) -> nodes.Node:
+    """The tree without the conditions that none of the rows needs.
+
+    Every rule acts in the same rows as before.  In states that no row shows, a rule may take what a
+    later one took.
+
+    Args:
+        tree: Rules in order of priority, as `reduced_tree` makes them; another tree stays as it is.
+        table: The rows, whose history is that of the demonstrator.
+        shown: Which of them count, shape (rows,); None for all.
+    """
+    if not isinstance(tree, nodes.Selector) or tree.memory:
+        return tree
+    cells = _Cells(tree, table, shown)
+    left = cells.all
+    rules: list[nodes.Node] = []
+    for place, rule in enumerate(tree.children):
+        match rule:
+            case nodes.Sequence(children=(*conditions, acting), memory=False) if all(
+                map(_is_formula, conditions)
+            ):
+                taken = left & cells.of_all(conditions)
+                # Nothing shows what a rule without rows needs.
+                needed = cells.needed_of_all(conditions, left) if taken else conditions
+                rules.append(nodes.Sequence((*_flat(needed), acting)))
+                left &= ~taken
+            case _:
+                # It takes all that is left, or more than can be told.
+                rules.extend(tree.children[place:])
+                break
+    return nodes.Selector(tuple(rules))
+
+
+def _is_formula(node: nodes.Node) -> bool:
+    """Whether a node only tells where it succeeds, and acts nowhere."""
+    match node:
+        case nodes.Condition():
+            return True
+        case nodes.Sequence(memory=False) | nodes.Selector(memory=False) | nodes.Inverter():
+            return all(map(_is_formula, nodes.children(node)))
+        case _:
+            return False
+
+
+class _Cells:
+    """Rows that satisfy the same conditions, as one; sets of them are bits of an integer.
+
+    Args:
+        tree: Whose conditions they are.
+        table: The rows.
+        shown: Which of them count; None for all.
+    """
+
+    def __init__(
+        self, tree: nodes.Node, table: DemonstrationTable, shown: BoolArray | None
+    ) -> None:
+        tested = dict.fromkeys(
+            node.literal.condition for node in nodes.walk(tree) if isinstance(node, nodes.Condition)
+        )
+        limits = (
+            limit.condition
+            for condition in tested
+            if isinstance(condition, Interval)
+            for limit in _limits(condition)
+        )
+        conditions = tuple(dict.fromkeys((*tested, *limits)))
+        count, satisfied = _distinct(conditions, table, shown)
+        self._satisfied = dict(zip(conditions, satisfied, strict=True))
+        self.all = (1 << count) - 1
+        """The set of all cells."""
+
+    def of(self, node: nodes.Node) -> int:
+        """Where a formula succeeds."""
+        match node:
+            case nodes.Condition(literal=literal):
+                satisfied = self._satisfied[literal.condition]
+                return satisfied if literal.positive else self.all & ~satisfied
+            case nodes.Inverter(child=child):
+                return self.all & ~self.of(child)
+            case nodes.Selector(children=alternatives):
+                return self.all & ~self._none_of(alternatives)
+            case _:
+                return self.of_all(nodes.children(node))
+
+    def of_all(self, formulas: Sequence[nodes.Node]) -> int:
+        """Where all of some formulas succeed."""
+        found = self.all
+        for formula in formulas:
+            found &= self.of(formula)
+        return found
+
+    def _none_of(self, formulas: Sequence[nodes.Node]) -> int:
+        found = self.all
+        for formula in formulas:
+            found &= ~self.of(formula)
+        return found
+
+    def needed_of_all(self, formulas: Sequence[nodes.Node], where: int) -> list[nodes.Node]:
+        """Those of some formulas that tell in which of some cells all of them succeed.
+
+        Comparisons of numbers are left out first: a threshold is one of many that could part the
+        same rows by chance.
+        """
+        trial = sorted(range(len(formulas)), key=lambda place: not _compares(formulas[place]))
+        return self._needed(formulas, trial, where, self.of)
+
+    def _needed(
+        self,
+        formulas: Sequence[nodes.Node],
+        trial: Sequence[int],
+        where: int,
+        succeeds: Callable[[nodes.Node], int],
+    ) -> list[nodes.Node]:
+        """Those that decide in some of the cells, at least one of them, each shortened.
+
+        Args:
+            formulas: A conjunction, of what `succeeds` says.
+            trial: The order in which they are left out if they can be.
+            where: The cells.
+            succeeds: In which cells a formula holds.
+        """
+        behind = [where] * (len(trial) + 1)
+        for turn in range(len(trial) - 1, -1, -1):
+            behind[turn] = behind[turn + 1] & succeeds(formulas[trial[turn]])
+        kept: dict[int, nodes.Node] = {}
+        before = where
+        for turn, place in enumerate(trial):
+            others = before & behind[turn + 1]
+            is_last = turn == len(trial) - 1 and not kept
+            if others & ~succeeds(formulas[place]) or is_last:
+                kept[place] = self._shortened(formulas[place], others)
+                before &= succeeds(kept[place])
+        return [kept[place] for place in sorted(kept)]
+
+    def _shortened(self, formula: nodes.Node, where: int) -> nodes.Node:
+        """A formula that succeeds in the same ones of some cells."""
+        match formula:
+            case nodes.Sequence(children=steps):
+                return _joined(nodes.Sequence, _flat(self.needed_of_all(steps, where)))
+            case nodes.Selector(children=alternatives):
+                # It fails where all of them fail.
+                needed = self._needed(
+                    alternatives,
+                    range(len(alternatives)),
+                    where,
+                    lambda alternative: self.all & ~self.of(alternative),
+                )
+                return _joined(nodes.Selector, needed)
+            case nodes.Condition(literal=Literal(condition=Interval() as interval, positive=True)):
+                same = where & self.of(formula)
+                limits = map(nodes.Condition, _limits(interval))
+                return next((one for one in limits if where & self.of(one) == same), formula)
+            case _:
+                return formula
+
+
+def _flat(steps: Sequence[nodes.Node]) -> list[nodes.Node]:
+    """Steps of a Sequence, those of Sequences among them on their own."""
+    return [
+        step
+        for one in steps
+        for step in (one.children if isinstance(one, nodes.Sequence) else (one,))
+    ]
+
+
+def _joined(
+    kind: type[nodes.Sequence] | type[nodes.Selector], formulas: Sequence[nodes.Node]
+) -> nodes.Node:
+    """Formulas under one node, which one of them does without."""
+    return formulas[0] if len(formulas) == 1 else kind(tuple(formulas))
+
+
+def _limits(interval: Interval) -> tuple[Literal, Literal]:
+    """The two comparisons that an interval stands for."""
+    return (
+        Literal(Threshold(interval.quantity, interval.at_most)),
+        Literal(Threshold(interval.quantity, interval.above), positive=False),
+    )
+
+
+def _compares(formula: nodes.Node) -> bool:
+    return isinstance(formula, nodes.Condition) and isinstance(
+        formula.literal.condition, Threshold | Interval
+    )
+
+
+def _distinct(
+    conditions: Sequence[Condition], table: DemonstrationTable, shown: BoolArray | None
+) -> tuple[int, list[int]]:
+    """How many kinds of rows the conditions tell apart, and the set that satisfies each one."""
+    kinds = np.empty((0, -(-len(conditions) // 8)), dtype=np.uint8)
+    for rows in in_parts(len(table)):
+        history = history_columns(table.actions, table.previous[rows], table.last[rows])
+        states = States(table.features, table.states[rows], history)
+        holds = np.empty((len(states), len(conditions)), dtype=bool)
+        for place, condition in enumerate(conditions):
+            holds[:, place] = states.satisfy(Literal(condition))
+        packed = np.packbits(holds if shown is None else holds[shown[rows]], axis=1)
+        kinds = np.unique(np.concatenate([kinds, packed]), axis=0)
+    satisfied = np.unpackbits(kinds, axis=1, count=len(conditions))
+    sets = np.packbits(satisfied, axis=0, bitorder="little")
+    return len(kinds), [int.from_bytes(column.tobytes(), "little") for column in sets.T]
