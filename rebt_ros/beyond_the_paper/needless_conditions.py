@@ -37,9 +37,18 @@ def without_needless_conditions(
     if not isinstance(tree, nodes.Selector) or tree.memory:
         return tree
     cells = _Cells(tree, table, shown)
+    rules = tree.children
+    # A shorter alternative can take over what another one was needed for.
+    while (shorter := _shorter(rules, cells)) != rules:
+        rules = shorter
+    return nodes.Selector(rules)
+
+
+def _shorter(rules: tuple[nodes.Node, ...], cells: _Cells) -> tuple[nodes.Node, ...]:
+    """The rules, each without conditions that none of the cells that reach it needs."""
     left = cells.all
-    rules: list[nodes.Node] = []
-    for place, rule in enumerate(tree.children):
+    found: list[nodes.Node] = []
+    for place, rule in enumerate(rules):
         match rule:
             case nodes.Sequence(children=(*conditions, acting), memory=False) if all(
                 map(_is_formula, conditions)
@@ -47,13 +56,13 @@ def without_needless_conditions(
                 taken = left & cells.of_all(conditions)
                 # Nothing shows what a rule without rows needs.
                 needed = cells.needed_of_all(conditions, left) if taken else conditions
-                rules.append(nodes.Sequence((*_flat(needed), acting)))
+                found.append(nodes.Sequence((*_flat(needed), acting)))
                 left &= ~taken
             case _:
                 # It takes all that is left, or more than can be told.
-                rules.extend(tree.children[place:])
+                found.extend(rules[place:])
                 break
-    return nodes.Selector(tuple(rules))
+    return tuple(found)
 
 
 def _is_formula(node: nodes.Node) -> bool:

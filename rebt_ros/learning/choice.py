@@ -3,9 +3,10 @@
 What cross-validation decides, it decides on rows that a tree was not learned from:
 
 - whether the tree may test the previous action: where that makes the explanation of the rows much
-  simpler (see `FittedTree.explanation`), or as large with fewer comparisons of numbers, whatever
-  cross-validation says, or makes it no larger and raises the mean recall of unpruned trees after
-  their own choices; of events that are sent when the action changes, which always differ from the
+  simpler (see `FittedTree.explanation`), whatever cross-validation says; where explanations are
+  equally large, by the size of the behavior trees, then by fewer comparisons of numbers; or where
+  it makes the explanation no larger and raises the mean recall of unpruned trees after their own
+  choices; of events that are sent when the action changes, which always differ from the
   one before, only where states hardly tell what to do;
 - whether it may test weighted sums of features: where they make the description of the rows shorter
   (see `weighted_sums`), unless that costs both agreement and mean recall;
@@ -26,6 +27,7 @@ from functools import partial
 import numpy as np
 
 from rebt_ros.arrays import BoolArray
+from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.wording import quantity_text
 from rebt_ros.decision_tree.differences import likely_differences
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
@@ -39,7 +41,7 @@ from rebt_ros.demonstration.last_action import NO_ACTION, History
 from rebt_ros.demonstration.table import DemonstrationTable, part_of
 from rebt_ros.errors import OptionError
 from rebt_ros.learning.chosen_policy import ChosenPolicy
-from rebt_ros.learning.conversion import own_history_choices
+from rebt_ros.learning.conversion import convert_shown, own_history_choices
 from rebt_ros.learning.cross_validation import MOST_FOLDS, CrossValidation
 from rebt_ros.learning.fitting import fit_options
 from rebt_ros.learning.judged_levels import JudgedLevels, clearly_raised
@@ -296,6 +298,14 @@ class _Choice:
             without_it, with_previous = (
                 simplest(self._telling, self._fitted(one)) for one in (states_alone, with_it)
             )
+            smaller, larger = sorted(sizes := [*map(self._nodes, (without_it, with_previous))])
+            if smaller < larger:
+                tested = sizes[1] == smaller
+                self.reasons.append(
+                    f"The previous action is {'tested' if tested else 'not tested'}: {compared}, "
+                    f"and the behavior tree has {sizes[1]} nodes with it, {sizes[0]} without."
+                )
+                return History.PREVIOUS if tested else History.NONE
             if _simpler(with_previous, without_it):
                 self.reasons.append(
                     f"The previous action is tested: {compared}, and {with_previous.comparisons} "
@@ -341,6 +351,11 @@ class _Choice:
     def _fitted(self, vocabulary: Vocabulary) -> FittedTree:
         """Fitted to the rows that tell what a tree may test."""
         return fit(self._telling, fit_options(self._options, vocabulary))
+
+    def _nodes(self, fitted: FittedTree) -> int:
+        """The size of a behavior tree that is not pruned."""
+        trained = fitted.at(0.0)
+        return nodes.size(convert_shown(trained, self._options, self._telling, psa=False))
 
     def _likely_differences(self, vocabulary: Vocabulary) -> tuple[Difference, ...]:
         options = self._options
