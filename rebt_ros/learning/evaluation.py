@@ -1,7 +1,8 @@
 """How well a behavior tree does on a table: fidelity and agreement.
 
 fidelity
-    It chooses what its decision tree predicts.
+    It chooses what its decision tree predicts; where conditions are left out (see
+    `needless_conditions`), in the rows that the decision tree gets right.
 agreement, teacher-forced
     It chooses what the demonstrator did, after what the demonstrator did before.  The column of
     LAT knows the action of its own row, from which it differs, so the figure flatters trees that

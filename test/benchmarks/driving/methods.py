@@ -115,6 +115,7 @@ METHODS: Mapping[str, Method] = {
     "unpruned": _product(rebt_ros.LearnOptions(ccp_alpha=0.0)),
     "no-history": _product(rebt_ros.LearnOptions(history=rebt_ros.History.NONE)),
     "no-differences": _product(rebt_ros.LearnOptions(differences=rebt_ros.Use.NEVER)),
+    "keep-conditions": _product(rebt_ros.LearnOptions(leave_out_conditions=False)),
     "no-sums": _product(rebt_ros.LearnOptions(sums=rebt_ros.Use.NEVER)),
     "no-reaction-time": _product(rebt_ros.LearnOptions(reaction_time=0.0)),
 }
