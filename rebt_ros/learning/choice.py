@@ -29,6 +29,7 @@ import numpy as np
 from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.wording import quantity_text
+from rebt_ros.beyond_the_paper.reductions import MOST_LEAVES_BY_DOMAIN
 from rebt_ros.decision_tree.differences import likely_differences
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree
@@ -298,9 +299,9 @@ class _Choice:
             without_it, with_previous = (
                 simplest(self._telling, self._fitted(one)) for one in (states_alone, with_it)
             )
-            smaller, larger = sorted(sizes := [*map(self._nodes, (without_it, with_previous))])
-            if smaller < larger:
-                tested = sizes[1] == smaller
+            sizes = self._sizes(without_it, with_previous)
+            if sizes[0] != sizes[1]:
+                tested = sizes[1] < sizes[0]
                 self.reasons.append(
                     f"The previous action is {'tested' if tested else 'not tested'}: {compared}, "
                     f"and the behavior tree has {sizes[1]} nodes with it, {sizes[0]} without."
@@ -352,10 +353,15 @@ class _Choice:
         """Fitted to the rows that tell what a tree may test."""
         return fit(self._telling, fit_options(self._options, vocabulary))
 
-    def _nodes(self, fitted: FittedTree) -> int:
-        """The size of a behavior tree that is not pruned."""
-        trained = fitted.at(0.0)
-        return nodes.size(convert_shown(trained, self._options, self._telling, psa=False))
+    def _sizes(self, *fits: FittedTree) -> tuple[int, ...]:
+        """Nodes of the behavior trees that are not pruned; 0 for all where one is very large."""
+        if any(fitted.leaves > MOST_LEAVES_BY_DOMAIN for fitted in fits):
+            return (0,) * len(fits)
+        trees = (
+            convert_shown(fitted.at(0.0), self._options, self._telling, psa=False)
+            for fitted in fits
+        )
+        return tuple(map(nodes.size, trees))
 
     def _likely_differences(self, vocabulary: Vocabulary) -> tuple[Difference, ...]:
         options = self._options

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from algorithm_1 import algorithm_1
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pruned_trees import train
+from robot_episodes import run_episode
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import Root
@@ -24,11 +27,14 @@ from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.errors import OptionError
 from rebt_ros.learning import evaluation
 from rebt_ros.learning.choice import choose
-from rebt_ros.learning.conversion import convert, own_history_choices
+from rebt_ros.learning.conversion import convert, convert_shown, own_history_choices
 from rebt_ros.learning.cross_validation import CrossValidation, folds
 from rebt_ros.learning.judged_levels import JudgedLevels, clearly_raised
 from rebt_ros.learning.options import LearnOptions, Use
 from rebt_ros.logic.conditions import Difference, WeightedSum
+from rebt_ros.simulated_robot.demonstrator import decide
+from rebt_ros.simulated_robot.robot import Robot, State
+from rebt_ros.simulated_robot.world import furnished_room
 
 
 def table(
@@ -415,6 +421,12 @@ def test_history_is_tested_where_it_makes_the_explanation_simpler_or_raises_reca
         and with_previous.comparisons < alone.comparisons
     )
     tested = with_it <= 0.8 * without or fewer or (with_it <= without and clearly)
+    nodes_alone, nodes_with_previous = (
+        nodes.size(convert_shown(one.at(0.0), LearnOptions(), rows, psa=False))
+        for one in (alone, with_previous)
+    )
+    if with_it == without and nodes_alone != nodes_with_previous:
+        tested = nodes_with_previous < nodes_alone
     follows = np.count_nonzero(rows.previous != NO_ACTION)
     itself = np.count_nonzero(rows.previous == rows.chosen)
     if rows.row_kind is RowKind.EVENT and itself < 0.1 * follows:
@@ -453,6 +465,37 @@ def test_what_was_heard_explains_one_demonstration_better_than_where_it_happened
         assert policy.fitted.leaves == 3
         assert policy.fitted.comparisons == 0
     assert "0 comparisons of numbers do instead of 1" in choose(rows, LearnOptions()).reasons[0]
+
+
+@pytest.mark.parametrize("first", [6, 18])
+def test_of_equally_large_explanations_the_one_with_the_smaller_behavior_tree_is_taken(
+    first: int,
+) -> None:
+    policy = choose(robot_runs(first, first + 1, first + 2), LearnOptions())
+    assert policy.fitted.vocabulary.history is History.NONE
+    said = re.search(r"the behavior tree has (\d+) nodes with it, (\d+)", policy.reasons[0])
+    assert said is not None
+    assert int(said[1]) > int(said[2])
+
+
+def robot_runs(*starts: int) -> DemonstrationTable:
+    """The simulated robot, driven to its goal by one who needs no memory."""
+    states: list[tuple[float, ...]] = []
+    labels: list[str] = []
+    numbers: list[int] = []
+
+    def driven(number: int, state: tuple[float, ...]) -> str:
+        states.append(tuple(map(float, state)))
+        labels.append(decide(state))
+        numbers.append(number)
+        return labels[-1]
+
+    for number, start in enumerate(starts):
+        run_episode(Robot(furnished_room(), start), partial(driven, number), 60.0)
+    kinds = {"docked": FeatureKind.BINARY}
+    features = tuple(Feature(name, kinds.get(name, FeatureKind.NUMERIC)) for name in State._fields)
+    plain = table([row[0] for row in states], labels, numbers)
+    return replace(plain, features=features, states=np.array(states), row_kind=RowKind.SAMPLE)
 
 
 def test_one_demonstration_in_which_little_happens_is_not_pruned() -> None:

@@ -278,7 +278,7 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
         "leave_out_conditions": declare.flag(
             "leave_out_conditions",
             True,
-            "Whether conditions that no shown row needs are left out of the tree.",
+            "Leave out conditions that no demonstrated row needs.",
             fixed=False,
         ),
         "readable_thresholds": declare.flag(
