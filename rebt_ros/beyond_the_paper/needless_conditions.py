@@ -19,6 +19,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import States, history_columns
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import Condition, Interval, Literal, Threshold
+from rebt_ros.paper.rule_trees import sequence
 
 
 def without_needless_conditions(
@@ -170,7 +171,7 @@ class _Cells:
         """A formula that succeeds in the same ones of some cells."""
         match formula:
             case nodes.Sequence(children=steps):
-                return _joined(nodes.Sequence, _flat(self.needed_of_all(steps, where)))
+                return sequence(_flat(self.needed_of_all(steps, where)))
             case nodes.Selector(children=alternatives):
                 # It fails where all of them fail.
                 needed = self._needed(
@@ -179,7 +180,7 @@ class _Cells:
                     where,
                     lambda alternative: self.all & ~self.of(alternative),
                 )
-                return _joined(nodes.Selector, needed)
+                return needed[0] if len(needed) == 1 else nodes.Selector(tuple(needed))
             case nodes.Condition(literal=Literal(condition=Interval() as interval, positive=True)):
                 same = where & self.of(formula)
                 limits = map(nodes.Condition, _limits(interval))
@@ -195,13 +196,6 @@ def _flat(steps: Sequence[nodes.Node]) -> list[nodes.Node]:
         for one in steps
         for step in (one.children if isinstance(one, nodes.Sequence) else (one,))
     ]
-
-
-def _joined(
-    kind: type[nodes.Sequence] | type[nodes.Selector], formulas: Sequence[nodes.Node]
-) -> nodes.Node:
-    """Formulas under one node, which one of them does without."""
-    return formulas[0] if len(formulas) == 1 else kind(tuple(formulas))
 
 
 def _limits(interval: Interval) -> tuple[Literal, Literal]:

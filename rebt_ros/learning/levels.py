@@ -96,16 +96,15 @@ class Evidence:
         tree = convert_shown(trained, self.options, table, psa=self.psa)
         figures = replace(
             self._figures(self.judge.at(ccp_alpha if judged_at is None else judged_at)),
-            fidelity_mismatches=mismatches(self._kept(trained), trained, tree),
+            fidelity_mismatches=mismatches(self._kept(trained, table), trained, tree),
         )
         learned = as_learned(table, trained, tree, ccp_alpha, figures, self.options)
         return LevelTree(replace(learned, shown=(shown_rows(table, trained),)), trained)
 
-    def _kept(self, trained: TrainedTree) -> DemonstrationTable:
+    def _kept(self, trained: TrainedTree, shown: DemonstrationTable) -> DemonstrationTable:
         """The rows in which a behavior tree does what its decision tree does."""
         if not leaves_out_conditions(trained, self.options):
             return self.table
-        shown = self.learned_from
         return shown.where(kept_rows(trained, shown, psa=self.psa))
 
     def _figures(self, judge: TrainedTree) -> Figures:
