@@ -11,6 +11,7 @@ fitted tree are the same trees, found in one pass.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,55 +112,80 @@ def pruning_path(grown: GrownTree) -> PruningPath:
     """
     parents = _parents(grown.left, grown.right)
     is_leaf = grown.left == _NONE
-    risk = grown.risk
-    branch_risk, leaves = np.zeros(len(grown)), np.zeros(len(grown), dtype=np.int64)
-    for leaf in np.flatnonzero(is_leaf):
-        node = int(leaf)
-        while node != _NONE:
-            branch_risk[node] += risk[leaf]
-            leaves[node] += 1
-            node = int(parents[node])
-
-    def effective_alpha(node: int) -> float:
-        return float((risk[node] - branch_risk[node]) / (leaves[node] - 1))
-
     collapse = np.where(is_leaf, -np.inf, np.inf)
-    newest = {int(node): effective_alpha(int(node)) for node in np.flatnonzero(~is_leaf)}
-    weakest = [(alpha, node) for node, alpha in newest.items()]
-    heapq.heapify(weakest)
-    reached = 0.0
-    while weakest:
-        alpha, node = heapq.heappop(weakest)
-        if newest.get(node) != alpha:
-            continue
-        # Rounding can make a later link a little weaker than an earlier one, or than nothing.
-        reached = max(reached, alpha)
-        for below in _splits_below(node, grown.left, grown.right, collapse):
-            collapse[below] = reached
-            newest.pop(below, None)
-        saved_risk, saved_leaves = risk[node] - branch_risk[node], leaves[node] - 1
-        above = node
-        while above != _NONE:
-            branch_risk[above] += saved_risk
-            leaves[above] -= saved_leaves
-            if above != node:
-                newest[above] = effective_alpha(above)
-                heapq.heappush(weakest, (newest[above], above))
-            above = int(parents[above])
+    for node, alpha in _Links(grown, parents).weakest_first():
+        collapse[node] = alpha
     pruned_at = np.unique(collapse[~is_leaf])
     alphas = np.concatenate(([0.0], pruned_at[pruned_at > 0]))
     return PruningPath(alphas, collapse, parents)
 
 
-def _splits_below(node: int, left: IntArray, right: IntArray, collapse: FloatArray) -> list[int]:
-    """The node and its descendants that are not leaves yet."""
-    found, waiting = [], [node]
-    while waiting:
-        one = waiting.pop()
-        if np.isposinf(collapse[one]):
-            found.append(one)
-            waiting += [int(left[one]), int(right[one])]
-    return found
+class _Links:
+    """The splits that are left while links are pruned.
+
+    Lists, as single numbers are looked up and changed much faster in them than in arrays.
+    """
+
+    def __init__(self, grown: GrownTree, parents: IntArray) -> None:
+        self._parents: list[int] = parents.tolist()
+        self._below: list[tuple[int, int]] = list(
+            zip(grown.left.tolist(), grown.right.tolist(), strict=True)
+        )
+        self._risk: list[float] = grown.risk.tolist()
+        self._is_split: list[bool] = (grown.left != _NONE).tolist()
+        self._branch_risk = [0.0] * len(grown)
+        self._leaves = [0] * len(grown)
+        for leaf in np.flatnonzero(grown.left == _NONE).tolist():
+            for node in self._up_from(leaf):
+                self._branch_risk[node] += self._risk[leaf]
+                self._leaves[node] += 1
+
+    def weakest_first(self) -> Iterator[tuple[int, float]]:
+        """Each split, and the ``ccp_alpha`` at which it is pruned; that never falls."""
+        newest = {
+            node: self._alpha(node) for node, is_split in enumerate(self._is_split) if is_split
+        }
+        weakest = [(alpha, node) for node, alpha in newest.items()]
+        heapq.heapify(weakest)
+        reached = 0.0
+        while weakest:
+            alpha, node = heapq.heappop(weakest)
+            if newest.get(node) != alpha:
+                continue
+            # Rounding can make a later link a little weaker than an earlier one, or than nothing.
+            reached = max(reached, alpha)
+            for below in self._cut(node):
+                del newest[below]
+                yield below, reached
+            saved_risk = self._risk[node] - self._branch_risk[node]
+            saved_leaves = self._leaves[node] - 1
+            for above in self._up_from(node):
+                self._branch_risk[above] += saved_risk
+                self._leaves[above] -= saved_leaves
+                if above != node:
+                    newest[above] = self._alpha(above)
+                    heapq.heappush(weakest, (newest[above], above))
+
+    def _alpha(self, node: int) -> float:
+        """The effective alpha of a split."""
+        return (self._risk[node] - self._branch_risk[node]) / (self._leaves[node] - 1)
+
+    def _cut(self, node: int) -> list[int]:
+        """Makes a leaf of a split; it and the splits below it, which are none any longer."""
+        found, waiting = [], [node]
+        while waiting:
+            one = waiting.pop()
+            if self._is_split[one]:
+                self._is_split[one] = False
+                found.append(one)
+                waiting += self._below[one]
+        return found
+
+    def _up_from(self, node: int) -> Iterator[int]:
+        """The node, its parent and so on up to the root."""
+        while node != _NONE:
+            yield node
+            node = self._parents[node]
 
 
 def _parents(left: IntArray, right: IntArray) -> IntArray:

@@ -100,6 +100,7 @@ class _Work:
     def __init__(self, graph: LatGraph, occurrences: Occurrences) -> None:
         self._nodes: dict[int, GraphNode] = dict(enumerate(graph.nodes))
         self._rank: dict[int, int] = {number: number for number in self._nodes}
+        self._deepest: set[int] = set()
         self._occurrences = occurrences
         self._engine = nx.DiGraph()
         self._engine.add_nodes_from(self._nodes)
@@ -156,6 +157,8 @@ class _Work:
         ]
         after = [successor for member in cycle for successor in self._engine.successors(member)]
         self._nodes[number] = node
+        if node.nesting >= DEEPEST_NESTING:
+            self._deepest.add(number)
         self._rank[number] = min(self._rank[member] for member in cycle)
         self._engine.add_node(number)
         self._engine.add_edges_from((one, number) for one in before if one not in cycle)
@@ -182,18 +185,15 @@ class _Work:
 
     def _of_shallow_nodes(self) -> nx.DiGraph:
         """The part of the graph whose cycles may be collapsed."""
-        if all(map(self._may_be_nested, self._engine)):
+        if not self._deepest:
             return self._engine
         # Not a subgraph view: those iterate over sets.
         shallow = nx.DiGraph()
-        shallow.add_nodes_from(filter(self._may_be_nested, self._engine))
+        shallow.add_nodes_from(one for one in self._engine if one not in self._deepest)
         shallow.add_edges_from(
-            edge for edge in self._engine.edges if all(map(self._may_be_nested, edge))
+            edge for edge in self._engine.edges if self._deepest.isdisjoint(edge)
         )
         return shallow
-
-    def _may_be_nested(self, number: int) -> bool:
-        return self._nodes[number].nesting < DEEPEST_NESTING
 
     def _as_cycle(self, loop: tuple[_Owners, ...]) -> _Cycle | None:
         """A cycle of the graph that the loop went through, its smallest number first.
@@ -202,7 +202,7 @@ class _Work:
         loop, few are ambiguous.
         """
         for first in loop[0]:
-            ways: list[_Cycle] = [(first,)] if self._may_be_nested(first) else []
+            ways: list[_Cycle] = [] if first in self._deepest else [(first,)]
             for owners in loop[1:]:
                 ways = [way for owner in owners for way in self._one_way_on(ways, owner)]
             for way in ways:
@@ -215,7 +215,7 @@ class _Work:
         for way in ways:
             if (
                 owner not in way
-                and self._may_be_nested(owner)
+                and owner not in self._deepest
                 and self._engine.has_edge(way[-1], owner)
             ):
                 yield (*way, owner)
