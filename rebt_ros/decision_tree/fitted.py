@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -180,15 +181,15 @@ class FittedTree:
         """
         is_leaf = self.path.leaves_at(ccp_alpha)
         exact = self._exact_thresholds()
-        low, high = _gaps(self.grown, table, self.vocabulary, exact)
+        low, high, largest = _gaps(self.grown, table, self.vocabulary, exact)
         of_quantity: dict[int, list[int]] = {}
         for node in np.flatnonzero(~is_leaf & np.isfinite(low) & (exact != KNOWN)).tolist():
             column = int(self.grown.column[node])
             if isinstance(self.asked[column], Number):
                 of_quantity.setdefault(column, []).append(node)
-        for split in of_quantity.values():
+        for column, split in of_quantity.items():
             gaps = [(float(low[node]), float(high[node])) for node in split]
-            exact[split] = shared_thresholds(gaps)
+            exact[split] = shared_thresholds(gaps, largest[column])
         return self._trained(is_leaf, exact)
 
     def _trained(self, is_leaf: BoolArray, thresholds: FloatArray | None) -> TrainedTree:
@@ -273,15 +274,19 @@ def _gaps(
     table: DemonstrationTable,
     vocabulary: Vocabulary,
     thresholds: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, dict[int, float]]:
     """The largest known value that goes left at each split, and the smallest that goes right.
 
     Returns:
-        Two of shape (nodes,): -inf and inf where there is none.
+        Two of shape (nodes,): -inf and inf where there is none.  The largest absolute value of each
+        column that is compared.
     """
     low, high = np.full(len(grown), -np.inf), np.full(len(grown), np.inf)
+    largest: dict[int, float] = {}
     for rows in in_parts(len(table)):
         values = _Values(grown, table, vocabulary, rows)
+        for column, its in values.largest():
+            largest[column] = max(largest.get(column, 0.0), its)
         node = np.zeros(rows.stop - rows.start, dtype=np.int64)
         under_way = np.arange(len(node))
         while (under_way := under_way[grown.left[node[under_way]] >= 0]).size:
@@ -291,7 +296,7 @@ def _gaps(
             np.maximum.at(low, at[left], value[left])
             np.minimum.at(high, at[~left], value[~left])
             node[under_way] = np.where(left, grown.left[at], grown.right[at])
-    return low, high
+    return low, high, largest
 
 
 class _Values:
@@ -306,6 +311,11 @@ class _Values:
             if place in split:
                 values = _asked(asked, table, rows)
                 self._columns[place] = np.where(np.isnan(values), np.inf, values)
+
+    def largest(self) -> Iterator[tuple[int, float]]:
+        """The largest absolute value of each column."""
+        for place, its in self._columns.items():
+            yield place, float(np.max(np.abs(its), initial=0.0, where=np.isfinite(its)))
 
     def of(self, rows: IntArray, column: IntArray) -> FloatArray:
         """The value of one column in each of the rows, shape (rows,)."""

@@ -22,9 +22,14 @@ _MARGIN = 0.2
 _FEW_DIGITS = 2
 #: Significant digits that tell any two doubles apart.
 _ALL_DIGITS = 17
+#: A rounder value near an end is taken where at most this share of such gaps would hold one as
+#: round by chance: a demonstrator who turns at 10 has hardly ever 9.9 in mind.
+_BY_CHANCE = 0.25
 
 
-def shared_thresholds(gaps: Sequence[tuple[float, float]]) -> list[float]:
+def shared_thresholds(
+    gaps: Sequence[tuple[float, float]], largest: float | None = None
+) -> list[float]:
     """A threshold for each gap: as few values as possible, each as round as possible.
 
     Greedy stabbing is minimal: going through the gaps by their ends, one that begins at or above
@@ -35,6 +40,7 @@ def shared_thresholds(gaps: Sequence[tuple[float, float]]) -> list[float]:
 
     Args:
         gaps: Of one quantity, each ``(low, high)`` with a finite low below high.
+        largest: Absolute value of the quantity; None for that of the gaps' ends.
 
     Returns:
         For each gap a value ``low <= t < high``, in O(n log n).
@@ -59,32 +65,52 @@ def shared_thresholds(gaps: Sequence[tuple[float, float]]) -> list[float]:
             place += 1
         reached[place] = max(reached[place], low)
         serving.append(place)
-    values = [roundest(low, end) for low, end in zip(reached, ends, strict=True)]
+    if largest is None:
+        largest = max((abs(end) for gap in gaps for end in gap if math.isfinite(end)), default=0.0)
+    values = [roundest(low, end, largest) for low, end in zip(reached, ends, strict=True)]
     return [values[place] for place in serving]
 
 
-def roundest(low: float, high: float) -> float:
+def roundest(low: float, high: float, largest: float = 0.0) -> float:
     """The roundest decimal in ``low <= t < high``, the one nearest to the middle of several.
 
-    Away from the ends, if that takes two significant digits at most.
+    It lies away from the ends if that takes two significant digits at most, unless one near an end
+    is too round to be there by chance.  That is 0, too, as a share of the largest value.
+
+    Args:
+        low: The end that the value may have.
+        high: The other one.
+        largest: Absolute value of what is compared; 0 where it is not known.
 
     >>> roundest(0.31, 0.55), roundest(-0.3, 0.2), roundest(98.7, 104.2), roundest(1.0, 1.0000001)
     (0.4, 0.0, 100.0, 1.0)
+    >>> roundest(9.79, 10.002), roundest(-0.03, 0.16), roundest(-0.03, 0.16, 10.0)
+    (10.0, 0.1, 0.0)
     """
     high = min(high, sys.float_info.max)
     # Halves, as the difference of two doubles can be infinite.
     half = high / 2 - low / 2
     middle = low + half
-    inner = (middle - half * (1 - 2 * _MARGIN), middle + half * (1 - 2 * _MARGIN))
-    for (least, most), digits in ((inner, _FEW_DIGITS), ((low, high), _ALL_DIGITS)):
-        found = _roundest(max(least, low), min(most, high), middle, digits)
-        if found is not None:
-            return found
-    return low
+    least, most = middle - half * (1 - 2 * _MARGIN), middle + half * (1 - 2 * _MARGIN)
+    inner = _roundest(max(least, low), min(most, high), middle, _FEW_DIGITS)
+    outer = _roundest(low, high, middle, _ALL_DIGITS)
+    if outer is None:
+        return low
+    value, power = outer
+    if inner is None:
+        return value
+    if value == 0:
+        power = max(largest, -low, high)
+    # The largest value that goes left was shown, and is no border between what was.
+    by_chance = half > _BY_CHANCE / 2 * power or value == low
+    return value if power > inner[1] and not by_chance else inner[0]
 
 
-def _roundest(low: float, high: float, middle: float, digits: int) -> float | None:
-    """The roundest decimal of at most so many significant digits; None where there is none."""
+def _roundest(low: float, high: float, middle: float, digits: int) -> tuple[float, float] | None:
+    """The roundest decimal of at most so many significant digits; None where there is none.
+
+    With the power of ten that it is a multiple of.
+    """
     largest = max(abs(low), abs(high))
     if largest == 0:
         return None
@@ -102,5 +128,6 @@ def _roundest(low: float, high: float, middle: float, digits: int) -> float | No
             if low <= value < high
         ]
         if inside:
-            return min(inside, key=lambda value: abs(value - middle)) + 0.0
+            nearest = min(inside, key=lambda value: abs(value - middle))
+            return nearest + 0.0, 10.0**exponent
     return None

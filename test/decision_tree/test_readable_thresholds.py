@@ -131,6 +131,35 @@ def test_a_threshold_is_what_a_person_would_write(low: float, high: float, expec
     assert roundest(low, high) == expected
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "largest", "expected"),
+    [
+        (9.79, 10.002, 10.5, 10.0),
+        (9.998, 10.31, 10.5, 10.0),
+        (-0.03, 0.16, 10.5, 0.0),
+        (0.398, 0.46, 3.0, 0.43),
+        (0.39, 0.405, 3.0, 0.4),
+        # Every third gap as wide as this one would hold 0, or a whole number.
+        (-0.03, 0.16, 0.5, 0.1),
+        (0.62, 1.02, 1.5, 0.8),
+        # What was shown itself is no border.
+        (0.0, 1.0, 10.0, 0.5),
+        (10.0, 12.0, 15.0, 11.0),
+    ],
+)
+def test_a_value_near_an_end_is_taken_if_it_is_too_round_to_be_there_by_chance(
+    low: float, high: float, largest: float, expected: float
+) -> None:
+    assert roundest(low, high, largest) == expected
+
+
+def test_how_much_a_zero_says_depends_on_the_largest_value() -> None:
+    gaps = [(-0.03, 0.16), (9.79, 10.002)]
+    assert shared_thresholds(gaps) == [0.0, 10.0]
+    assert shared_thresholds(gaps[:1]) == [0.1]
+    assert shared_thresholds(gaps[:1], 10.5) == [0.0]
+
+
 @given(_GAPS)
 def test_no_rounder_value_stands_in_the_inner_part_of_a_gap(gap: tuple[float, float]) -> None:
     low, high = gap
