@@ -10,11 +10,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from decimal import Decimal
 
 import numpy as np
 
+from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.decision_tree.encoding import Number
 from rebt_ros.decision_tree.fitted import FittedTree
+from rebt_ros.decision_tree.tree import DecisionTree, Split
+from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.logic.conditions import Threshold
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,3 +53,34 @@ def shortest_description(fitted: FittedTree) -> Description:
     bits, is_leaf = grown.cheapest(1 + math.log2(actions) + exceptions * exception_bits, split)
     leaves = np.unique(fitted.path.standing(is_leaf)[grown.left < 0])
     return Description(bits, int(exceptions[leaves].sum()), exception_bits)
+
+
+def border_bits(tree: DecisionTree, table: DemonstrationTable) -> float:
+    """What it takes to say the numbers that a tree compares with.
+
+    Each is one of the multiples of its power of ten up to the largest absolute value in a table, as
+    10 of 0 and 10, and 9.3 of more than a hundred.  Beside the size of a tree that tells borders
+    that a person has in mind from such as only part the rows.
+
+    Args:
+        tree: With thresholds that are as round as they can be.
+        table: The rows that it parts.
+    """
+    borders = {
+        node.condition
+        for node in tree.walk()
+        if isinstance(node, Split) and isinstance(node.condition, Threshold)
+    }
+    tests = StateTests(table.features)
+    bits = 0.0
+    for border in borders:
+        values = np.abs(tests.reading(border.quantity)(table.states.T))
+        largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
+        if border.value:
+            bits += max(math.log2(largest) - math.log2(_power_of_ten(border.value)), 0.0)
+    return bits
+
+
+def _power_of_ten(value: float) -> float:
+    """The largest power of ten that a value other than 0 is a multiple of, as it is written."""
+    return float(10.0 ** int(Decimal(repr(value)).normalize().as_tuple().exponent))

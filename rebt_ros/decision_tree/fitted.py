@@ -179,7 +179,17 @@ class FittedTree:
             ccp_alpha: The pruning level.
             table: What the tree was fitted to, without made-up rows.
         """
-        is_leaf = self.path.leaves_at(ccp_alpha)
+        return self._readable(self.path.leaves_at(ccp_alpha), table)
+
+    def readable_explained(self, table: DemonstrationTable) -> TrainedTree:
+        """The tree of the explanation, with thresholds that are round and shared.
+
+        Args:
+            table: What the tree was fitted to, without made-up rows.
+        """
+        return self._readable(self._explaining()[1], table)
+
+    def _readable(self, is_leaf: BoolArray, table: DemonstrationTable) -> TrainedTree:
         exact = self._exact_thresholds()
         low, high, largest = _gaps(self.grown, table, self.vocabulary, exact)
         of_quantity: dict[int, list[int]] = {}

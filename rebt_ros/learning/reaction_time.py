@@ -19,6 +19,9 @@ Few demonstrations have few changes of action, so that explanations differ by on
 exceptions.  Then it tells more how many bits they take (see `shortest_description`): who goes when
 a bell has rung is described by one test of the bell, and who goes two rows later by a position for
 each demonstration.
+
+Where several delays explain the rows equally well, borders tell them apart: who turns at 10 does so
+at the true delay only, and a row later at 9.37 (see `border_bits`).
 """
 
 from __future__ import annotations
@@ -26,11 +29,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 
 from rebt_ros.arrays import IntArray
-from rebt_ros.decision_tree.description_length import Description, shortest_description
+from rebt_ros.decision_tree.description_length import (
+    Description,
+    border_bits,
+    shortest_description,
+)
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.training import FitOptions, fit
@@ -71,6 +79,8 @@ _BITS = 10.0
 _EQUAL_BITS = 4.0
 #: What takes a leaf or an exception for more than this share of the rows explains nothing.
 _LARGEST = 1 / 3
+#: Borders are clearly rounder if it takes so many bits less to say them: a digit.
+_ROUNDER = math.log2(10)
 
 _WITH_PREVIOUS = Vocabulary(history=History.PREVIOUS)
 
@@ -128,7 +138,8 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
     at one border and goes on until another one looks as if late at a border between them: where
     previous actions explain that with two leaves for each action, states alone have to do clearly
     better than that.  Of neighbors that are equally small it is the one in the middle; if they
-    reach to the longest delay, as where each state follows from the one before, the first of them.
+    reach to the longest delay, as where each state follows from the one before, the first of them;
+    but if the borders of another one that is as small are clearly rounder, it is that.
 
     A delay is clear if its explanation is not larger than a third of the rows, and smaller than the
     one without a delay by a tenth and by a standard error, where sizes are counts: of a and b, the
@@ -157,6 +168,7 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
             trials, by_states_alone = described, False
     sentence = _NOT_LATE
     if rows:
+        rows = explanations.roundest(rows, trials, by_states_alone, in_bits)
         seconds = _seconds(rows, gap)
         counted = f"{rows} row{'s' * (rows > 1)}"
         late = counted if seconds is None else f"{seconds:.2f} s ({counted})"
@@ -231,6 +243,38 @@ class _Explanations:
         )
         return best.rows if clear else 0, trials
 
+    def roundest(
+        self, rows: int, trials: Sequence[Trial], by_states_alone: bool, in_bits: bool
+    ) -> int:
+        """Of the delays that explain the rows as well, the one with the roundest borders.
+
+        Args:
+            rows: A clear delay, kept unless the borders of another one are clearly rounder.
+            trials: What it was found by.
+            by_states_alone: Whether the previous action was not tested.
+            in_bits: Whether their sizes are in bits.
+        """
+        vocabulary = FEATURES_ALONE if by_states_alone else _WITH_PREVIOUS
+        sizes = {one.rows: one.size for one in trials}
+        most = sizes[rows] + (_EQUAL_BITS if in_bits else 0)
+
+        def explains(delay: int) -> bool:
+            if delay not in sizes:
+                fitted = self._fitted(delay, vocabulary)
+                sizes[delay] = shortest_description(fitted).bits if in_bits else fitted.explanation
+            return sizes[delay] <= most
+
+        tried = [delay for delay in sizes if 0 < delay < self._most and explains(delay)]
+        near = max(rows - _FIRST_TRIALS, 1), min(rows + _FIRST_TRIALS, self._most)
+        earlier = takewhile(explains, range(rows - 1, near[0] - 1, -1))
+        later = takewhile(explains, range(rows + 1, near[1]))
+        bits: dict[int, float] = {}
+        for delay in sorted({*tried, *earlier, *later}):
+            explained = self._fitted(delay, vocabulary).readable_explained(self._late(delay))
+            bits[delay] = border_bits(explained.tree, self._late(delay))
+        best = min(bits, key=lambda delay: (bits[delay], abs(delay - rows)))
+        return best if bits[best] <= bits[rows] - _ROUNDER else rows
+
     def trials(self) -> tuple[tuple[Trial, ...], bool]:
         """What decides, by ascending delay, and whether it is about states alone."""
         alone = Trial(0, self._size(0, FEATURES_ALONE))
@@ -280,8 +324,12 @@ class _Explanations:
         return self._trees[delay, vocabulary]
 
     def _fit(self, delay: int, vocabulary: Vocabulary) -> FittedTree:
+        return fit(self._late(delay), FitOptions(vocabulary=vocabulary))
+
+    def _late(self, delay: int) -> DemonstrationTable:
+        """The rows that are explained, with the states of so many rows before."""
         table, rows = self._table, self._rows
-        late = replace(
+        return replace(
             table,
             states=table.states[rows - delay],
             chosen=table.chosen[rows],
@@ -290,7 +338,6 @@ class _Explanations:
             before=None,
             previous=table.previous[rows],
         )
-        return fit(late, FitOptions(vocabulary=vocabulary))
 
 
 def _stretches(rows: IntArray) -> IntArray:

@@ -9,7 +9,7 @@ import strategies as some
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rebt_ros.decision_tree.description_length import shortest_description
+from rebt_ros.decision_tree.description_length import border_bits, shortest_description
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE
 from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.schema import Feature, FeatureKind
@@ -56,3 +56,23 @@ def test_no_description_is_longer_than_naming_the_exceptions_of_one_action(
     most = max(map(actions.count, set(actions)))
     assert 0 < said.bits <= 1 + math.log2(shown) + (len(rows) - most) * said.exception_bits + 1e-9
     assert 0 <= said.exceptions <= len(rows) - most
+
+
+def test_round_borders_take_fewer_bits() -> None:
+    def bits(*borders: float) -> float:
+        states = [[border + side] for border in borders for side in (-1e-4, 1e-4)] * 3 + [[100.0]]
+        actions = [sum(x > border for border in borders) % 2 for (x,) in states]
+        table = some.table(states, actions, [0] * len(actions), (NUMBER,))
+        fitted = fit(table, PLAIN)
+        return border_bits(fitted.readable_explained(table).tree, table)
+
+    assert bits(0.0) == 0
+    assert bits(10.0) == pytest.approx(math.log2(10))
+    assert bits(20.0) == pytest.approx(math.log2(10))
+    assert bits(9.37) == pytest.approx(math.log2(10_000))
+    assert bits(9.37, 20.0) == pytest.approx(math.log2(10_000) + math.log2(10))
+
+
+def test_a_tree_without_thresholds_has_no_borders() -> None:
+    table = some.table([[0], [1]] * 5, [0, 1] * 5, [0] * 10, (SWITCH,))
+    assert border_bits(fit(table, PLAIN).readable_explained(table).tree, table) == 0

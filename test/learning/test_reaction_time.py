@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -54,9 +55,12 @@ def acted_late(decide: Iterator[int], late: int) -> Callable[[], int]:
 
 
 def shuttle(
-    late: int, seed: int, turns: int = 6, leg: float = 10
+    late: int, seed: int, turns: int = 6, leg: float = 10, wall: float = math.inf
 ) -> tuple[list[list[float]], list[int]]:
-    """To and fro between 0 and `leg`, about half a metre at a time: this needs memory."""
+    """To and fro between 0 and `leg`, about half a metre at a time: this needs memory.
+
+    A wall stands so far behind either end.
+    """
     chance = random.Random(seed)
     x, target = chance.uniform(1, leg - 1), RIGHT
 
@@ -70,6 +74,7 @@ def shuttle(
         states.append([x, chance.random()])
         actions.append(act())
         x += (1 if actions[-1] == RIGHT else -1) * chance.uniform(0.4, 0.6)
+        x = min(max(x, -wall), leg + wall)
         if x >= leg if target == RIGHT else x <= 0:
             target, turns = LEFT + RIGHT - target, turns - 1
     return states, actions
@@ -333,6 +338,7 @@ def test_a_delay_is_taken_where_sizes_have_a_clear_valley(
     # Without a delay states with the previous action are asked for, too.
     left = iter([sizes[0], 99, *sizes[1:]])
     monkeypatch.setattr(FittedTree, "explanation", property(lambda _: next(left)))
+    monkeypatch.setattr(reaction_time, "border_bits", lambda *_: 0.0)
     found = estimate(shuttles(0))
     assert found.trials == tuple(Trial(*one) for one in enumerate(sizes))
     assert found.rows == rows
@@ -426,6 +432,23 @@ def test_three_demonstrations_of_one_change_each_tell_the_delay(late: int) -> No
     found = estimate(table)
     assert found.rows == late
     assert found.in_bits == (late > 0)
+
+
+@pytest.mark.parametrize("late", [2, 4])
+@pytest.mark.parametrize("seed", range(0, 60, 20))
+def test_where_several_delays_explain_the_rows_round_borders_tell_which(
+    seed: int, late: int
+) -> None:
+    table = joined(*(shuttle(late, seed + number, turns=4, wall=0.5) for number in range(3)))
+    found = estimate(table)
+    assert found.rows == late
+    sizes = [one.size for one in found.trials]
+    assert sizes.count(min(sizes)) > 1
+
+
+def test_borders_that_are_no_rounder_do_not_move_a_delay() -> None:
+    sloped = joined(*(shuttle(3, seed, leg=9.37) for seed in range(20)))
+    assert estimate(sloped).rows == 3
 
 
 @pytest.mark.parametrize(
