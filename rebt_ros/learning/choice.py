@@ -59,7 +59,7 @@ _FEWEST_ROWS = 20
 _LARGE, _ROWS_THAT_TELL = 6_000, 2_000
 
 #: To which share the previous action has to bring the size of the explanation.
-_MUCH_SIMPLER = 0.8
+_MUCH_SIMPLER = 0.875
 
 #: Share of events up to which it is hardly ever that an action follows itself.
 _HARDLY = 0.1
