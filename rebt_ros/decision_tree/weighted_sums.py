@@ -261,10 +261,22 @@ def _as_sum(
     names: Sequence[str],
     digits: int,
 ) -> WeightedSum | None:
-    """The sum of the features themselves, the one that matters most first, with a weight of 1."""
+    """The sum of the features themselves, the one that matters most first.
+
+    One of them has a weight of 1, for which the other weights lose least when they are rounded: as
+    in ``v + 4 × spin + 10 × angle``, which is ``angle + 0.1 × v + 0.4 × spin``.
+    """
     order = [place for place in np.argsort(-np.abs(scaled), kind="stable") if scaled[place]]
     own = scaled / spread
-    weights = [float(f"{own[place] / own[order[0]]:.{digits}g}") for place in order]
+
+    def rounded(base: int) -> list[float]:
+        return [float(f"{own[place] / own[base]:.{digits}g}") for place in order]
+
+    def lost(base: int) -> float:
+        off = np.array(rounded(base)) * own[base] - own[order]
+        return float(np.abs(off * spread[order]).sum())
+
+    weights = rounded(min(order, key=lost))
     reach = sum(abs(weight) * largest[place] for weight, place in zip(weights, order, strict=True))
     if not all(weights) or not reach <= LARGEST_VALUE or weights == [1.0, -1.0]:
         return None

@@ -57,6 +57,22 @@ def test_the_line_between_two_actions_is_found_by_its_own_features() -> None:
     assert with_it.leaves <= fit(table).leaves / 3
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_round_weights_are_found_to_the_digit_whichever_feature_they_are_said_by(seed: int) -> None:
+    scales = (2.0, 1.5, 0.2, 1.0)
+    features = tuple(map(Feature, ("x", "v", "angle", "spin")))
+    rule = {"x": 0.05, "v": 0.1, "angle": 1.0, "spin": 0.4}
+    states = np.random.default_rng(seed).normal(size=(8_000, 4)) * scales
+    weighed = states @ np.array([*rule.values()])
+    # Who balances is close to the border all the time.
+    close = np.abs(weighed) < 0.1
+    (line,) = found(shown(states[close], weighed[close] > 0, features))
+    weights = dict(line.terms)
+    assert {name: weight / weights["angle"] for name, weight in weights.items()} == pytest.approx(
+        rule, rel=1e-9
+    )
+
+
 def test_a_line_is_found_where_one_step_in_twenty_is_a_mistake() -> None:
     states = drawn()
     chosen = braking(states) ^ (np.random.default_rng(2).random(len(states)) < 0.05)
