@@ -202,7 +202,9 @@ _numeric = st.sampled_from(("distance", "battery"))
 
 @st.composite
 def _atoms(draw: st.DrawFn, deciding: str) -> Written:
-    kind = draw(st.sampled_from(("number", "number", "range", "truth", "kind", "pair", "back")))
+    kind = draw(
+        st.sampled_from(("number", "number", "range", "truth", "kind", "pair", "sum", "back"))
+    )
     name, value = draw(_numeric), draw(st.sampled_from(some.THRESHOLDS))
     sign = draw(st.sampled_from(sorted(_SIGNS)))
     compare = _SIGNS[sign]
@@ -244,6 +246,8 @@ def _atoms(draw: st.DrawFn, deciding: str) -> Written:
                 lambda s: compare(s.column(names[0]) - s.column(names[1]), value),
                 differs=True,
             )
+        case "sum":
+            return draw(_sums(sign, value))
         case _:
             label = draw(st.sampled_from(some.LABELS))
             if draw(st.booleans()):
@@ -251,6 +255,28 @@ def _atoms(draw: st.DrawFn, deciding: str) -> Written:
                 return Written(f"doing {label}", lambda s: where(previous, s), looks_back=True)
             last = LastActionIs(label, (deciding,))
             return Written(f"last action = {label}", lambda s: where(last, s), looks_back=True)
+
+
+@st.composite
+def _sums(draw: st.DrawFn, sign: str, value: float) -> Written:
+    """Weighted sums, also that of `strategies.SUM`, in either order and with either sign."""
+    weights = draw(
+        st.sampled_from(((-0.7, 1.3), (0.7, -1.3), (1.0, 0.5), (2.0, -1.0), (-1.0, -3.0), (1, 1)))
+    )
+    terms = list(zip(("distance", "battery"), weights, strict=True))
+    (one, first), (other, second) = draw(st.permutations(terms))
+    compare = _SIGNS[sign]
+
+    def total(states: Everything) -> np.ndarray:
+        return first * states.column(one) + second * states.column(other)
+
+    if draw(st.booleans()):
+        # The second term stands on the other side.
+        text = f"{first} * {one} {sign} {-second} × {other}"
+        return Written(text, lambda s: compare(total(s), 0.0), differs=True)
+    minus, size = ("-" if second < 0 else "+"), abs(second)
+    text = f"{first} * {one} {minus} {other} * {size} {sign} {value}"
+    return Written(text, lambda s: compare(total(s), value), differs=True)
 
 
 def conditions(deciding: str) -> st.SearchStrategy[Written]:

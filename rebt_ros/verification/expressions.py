@@ -40,19 +40,27 @@ class Number:
 
 
 @dataclass(frozen=True, slots=True)
-class Subtraction:
-    """``minuend - subtrahend``."""
+class Term:
+    """``weight * feature``."""
 
-    minuend: Word
-    subtrahend: Word
+    weight: float
+    feature: Word
 
     @property
     def at(self) -> int:
-        """Where it begins."""
-        return self.minuend.at
+        """Where its feature begins."""
+        return self.feature.at
 
 
-Side: TypeAlias = Word | Number | Subtraction
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """``front + 0.5 * left - right``."""
+
+    terms: tuple[Term, ...]
+    at: int
+
+
+Side: TypeAlias = Word | Number | Sum
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +84,7 @@ class Truth:
 class Presence:
     """What is measured is known, or missing."""
 
-    measured: Word | Subtraction
+    measured: Word | Sum
     known: bool
 
 

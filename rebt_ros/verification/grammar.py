@@ -7,11 +7,14 @@
     single = "not" single | "(" any ")" | "doing" name | "last action" ("=" | "!=") name
            | name | side "is" ("known" | "missing" | "true" | "false")
            | side sign side | side sign side sign side
-    side   = number | name | name "-" name
+    side   = number | name | sum
+    sum    = [ "-" ] term { ( "+" | "-" ) term }
+    term   = name | number "*" name | name "*" number
     sign   = "<" | "<=" | ">" | ">=" | "=" | "!="
 
 A name is a word, such as ``front`` or ``imu/roll.x``, or any text in quotes.  It may have hyphens
-inside, so a minus stands between blanks.
+inside, so a minus stands between blanks.  ``×`` is as good as ``*``, so that a condition can be
+copied from the text of a tree.
 """
 
 from __future__ import annotations
@@ -35,7 +38,8 @@ from rebt_ros.verification.expressions import (
     Presence,
     Side,
     Sign,
-    Subtraction,
+    Sum,
+    Term,
     Truth,
     Word,
 )
@@ -74,6 +78,15 @@ class _Token:
         """Whether it is one of these words of the grammar; a quoted one is a name."""
         return self.kind is _Kind.WORD and self.text in words
 
+    def is_mark(self, marks: str) -> bool:
+        """Whether it is one of these marks."""
+        return self.kind is _Kind.MARK and self.text in marks
+
+    @property
+    def is_signed(self) -> bool:
+        """Whether it is a number that begins with a sign, which may join it to a sum."""
+        return self.kind is _Kind.NUMBER and self.text[0] in "+-"
+
     def __str__(self) -> str:
         return "the end" if self.kind is _Kind.END else repr(self.text)
 
@@ -84,7 +97,7 @@ _TOKEN: Final = re.compile(
       | (?P<quoted>'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")
       | (?P<word>[^\W\d][\w./]*(?:-[\w./]+)*|\d[\w./]*)
       | (?P<sign><=|>=|==|!=|[<>=≤≥≠])
-      | (?P<mark>[()\-−])
+      | (?P<mark>[()\-−+*×])
       | (?P<end>$)
     )""",
     re.VERBOSE,
@@ -105,6 +118,10 @@ _SIGNS: Final = {
 _RISING: Final = (Sign.BELOW, Sign.AT_MOST)
 _FALLING: Final = (Sign.ABOVE, Sign.AT_LEAST)
 _EQUALITY: Final = (Sign.EQUAL, Sign.DIFFERENT)
+
+_PLUS: Final = "+"
+_MINUS: Final = "-−"
+_TIMES: Final = "*×"
 
 #: Words with a meaning, which are names only in quotes.
 _RESERVED: Final = frozenset({"and", "or", "not", "is", "doing"})
@@ -199,10 +216,10 @@ class _Parser:
         if token.is_word("not"):
             self._take()
             return Not(self._single(deepest - 1))
-        if token.kind is _Kind.MARK and token.text == "(":
+        if token.is_mark("("):
             self._take()
             inner = self.any_of(deepest - 1)
-            if self._next.text != ")" or self._next.kind is not _Kind.MARK:
+            if not self._next.is_mark(")"):
                 raise self._refuse("')'")
             self._take()
             return inner
@@ -258,13 +275,48 @@ class _Parser:
 
     def _side(self) -> Side:
         token = self._next
-        if token.kind is _Kind.NUMBER:
+        if token.kind is _Kind.NUMBER and not self._tokens[self._place + 1].is_mark(_TIMES):
             return self._number()
-        name = self._name("a feature or a number")
-        if self._next.kind is _Kind.MARK and self._next.text in "-−":
+        if token.is_mark(_MINUS):
             self._take()
-            return Subtraction(name, self._name("a feature"))
-        return name
+            return self._sum(token.at, self._term(-1.0))
+        first = self._term(1.0)
+        if first.weight == 1.0 and not self._goes_on:
+            return first.feature
+        return self._sum(token.at, first)
+
+    @property
+    def _goes_on(self) -> bool:
+        """Whether a further term comes."""
+        return self._next.is_mark(_PLUS + _MINUS) or self._next.is_signed
+
+    def _sum(self, at: int, first: Term) -> Sum:
+        terms = [first]
+        while self._goes_on:
+            # In "x -2 * y", the minus was read as that of the number.
+            sign = "+" if self._next.is_signed else self._take().text
+            terms.append(self._term(1.0 if sign in _PLUS else -1.0))
+        return Sum(tuple(terms), at)
+
+    def _term(self, weight: float) -> Term:
+        token = self._next
+        if token.kind is _Kind.NUMBER:
+            number = self._number()
+            if not self._next.is_mark(_TIMES):
+                raise ConditionSyntaxError(
+                    f"{token.text} is added to a feature: put it on the other side of the "
+                    "comparison, or '*' and a feature behind it",
+                    token.at,
+                )
+            self._take()
+            return Term(weight * number.value, self._name("a feature"))
+        feature = self._name("a feature or a number")
+        if not self._next.is_mark(_TIMES):
+            return Term(weight, feature)
+        self._take()
+        if self._next.kind is not _Kind.NUMBER:
+            raise self._refuse("a number")
+        return Term(weight * self._number().value, feature)
 
     def _number(self) -> Number:
         token = self._take()

@@ -41,6 +41,7 @@ from rebt_ros.logic.conditions import (
     StateCondition,
     Threshold,
     WeightedSum,
+    combination,
     features_of,
 )
 from rebt_ros.verification.errors import RuleError
@@ -256,9 +257,16 @@ def restricted(boxes: Boxes, words: slice, mask: Boxes) -> Boxes:
 
 
 def canonical(quantity: Quantity) -> Quantity:
-    """The same quantity, a difference in the direction in which a grid has it."""
-    if isinstance(quantity, Difference) and quantity.minuend > quantity.subtrahend:
-        return Difference(quantity.subtrahend, quantity.minuend)
+    """The same quantity, a combination with the signs with which a grid has it.
+
+    With the other signs, it is the same number with the other sign, to the last bit.
+    """
+    match quantity:
+        case Difference(minuend=minuend, subtrahend=subtrahend) if minuend > subtrahend:
+            return Difference(subtrahend, minuend)
+        case WeightedSum(terms=((_, first), *_)) if first < 0:
+            opposite = combination(tuple((name, -weight) for name, weight in quantity.terms))
+            return opposite if isinstance(opposite, WeightedSum) else quantity
     return quantity
 
 

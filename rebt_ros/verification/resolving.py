@@ -13,14 +13,16 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.schema import TRUTH, Feature, FeatureKind, number_of
 from rebt_ros.logic.conditions import (
     KNOWN,
-    Difference,
     HasCategory,
+    Interval,
     IsTrue,
     LastActionIs,
     Literal,
     PreviousActionIs,
     Quantity,
     Threshold,
+    WeightedSum,
+    combination,
 )
 from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.expressions import (
@@ -35,7 +37,8 @@ from rebt_ros.verification.expressions import (
     Presence,
     Side,
     Sign,
-    Subtraction,
+    Sum,
+    Term,
     Truth,
     Word,
 )
@@ -123,9 +126,9 @@ class _Resolver:
         true = Literal(IsTrue(feature.name))
         return true if value else AllOf((_known(feature.name), ~true))
 
-    def _known(self, measured: Word | Subtraction) -> Formula:
-        if isinstance(measured, Subtraction):
-            return _known(self._difference(measured.minuend, measured.subtrahend))
+    def _known(self, measured: Word | Sum) -> Formula:
+        if isinstance(measured, Sum):
+            return _known(self._combination(measured.terms))
         feature = self._feature(measured)
         if feature.kind is FeatureKind.CATEGORICAL:
             return _among(feature, feature.categories)
@@ -143,17 +146,21 @@ class _Resolver:
             feature = self._feature(left)
             if feature.kind is FeatureKind.CATEGORICAL:
                 return self._category(feature, sign, right)
+        assert not isinstance(left, Number)
         if isinstance(right, Number):
-            return _compared(self._quantity(left), sign, right.value)
-        if isinstance(left, Word) and isinstance(right, Word):
-            if not self._is_measured(right):
-                self._refuse(
-                    f"{right.text!r} is neither a number nor a feature, and {left.text!r} has no "
-                    "categories",
-                    right.at,
-                )
-            return _compared(self._difference(left, right), sign, 0.0)
-        self._refuse("a difference is compared with a number", right.at)
+            quantity = self._combination(left.terms) if isinstance(left, Sum) else left.text
+            return _compared(quantity, sign, right.value)
+        if isinstance(right, Word) and not self._is_measured(right):
+            self._refuse(
+                f"{right.text!r} is neither a number nor a feature, and {left.text!r} has no "
+                "categories"
+                if isinstance(left, Word)
+                else "a sum is compared with a number or with features",
+                right.at,
+            )
+        # What stands on the right is taken to the left.
+        across = tuple(Term(-one.weight, one.feature) for one in _terms(right))
+        return _compared(self._combination(_terms(left) + across), sign, 0.0)
 
     def _category(self, feature: Feature, sign: Sign, right: Side) -> Formula:
         if sign not in (Sign.EQUAL, Sign.DIFFERENT):
@@ -161,7 +168,7 @@ class _Resolver:
                 f"{feature.name!r} has categories, {feature.examples}: compare it with = or !=",
                 right.at,
             )
-        if isinstance(right, Subtraction):
+        if isinstance(right, Sum):
             self._refuse(f"{feature.name!r} has categories, {feature.examples}", right.at)
         wanted = right.text
         if wanted not in feature.categories and isinstance(right, Number):
@@ -183,29 +190,52 @@ class _Resolver:
     def _is_measured(self, side: Side) -> bool:
         if isinstance(side, Word):
             return any(feature.name == side.text for feature in self.learned.features)
-        return isinstance(side, Subtraction)
+        return isinstance(side, Sum)
 
-    def _quantity(self, side: Side) -> Quantity:
-        match side:
-            case Word():
-                return self._feature(side).name
-            case Subtraction(minuend=minuend, subtrahend=subtrahend):
-                return self._difference(minuend, subtrahend)
-            case Number():
-                raise AssertionError(side)
-
-    def _difference(self, minuend: Word, subtrahend: Word) -> Difference:
-        for word in (minuend, subtrahend):
-            feature = self._feature(word)
+    def _combination(self, written: tuple[Term, ...]) -> Quantity:
+        """What is computed from several features."""
+        for term in written:
+            feature = self._feature(term.feature)
             if feature.kind is FeatureKind.CATEGORICAL:
                 self._refuse(
                     f"{feature.name!r} has categories, {feature.examples}, which cannot be "
-                    "subtracted",
-                    word.at,
+                    "computed with",
+                    term.at,
                 )
-        if minuend.text == subtrahend.text:
-            self._refuse(f"{minuend.text!r} is compared with itself", subtrahend.at)
-        return Difference(minuend.text, subtrahend.text)
+            if not term.weight or not math.isfinite(term.weight):
+                self._refuse(f"{feature.name!r} is multiplied by {term.weight:g}", term.at)
+        weights: dict[str, float] = {}
+        for term in written:
+            if term.feature.text in weights:
+                self._refuse(
+                    f"{term.feature.text!r} is compared with itself"
+                    if len(written) == 2
+                    else f"{term.feature.text!r} is named twice: name it once, with one number",
+                    term.at,
+                )
+            weights[term.feature.text] = term.weight
+        if len(weights) == 1:
+            [(name, weight)] = weights.items()
+            self._refuse(
+                f"{name!r} alone is multiplied: compare {name!r} itself, and divide the other side "
+                f"by {weight:g}",
+                written[0].at,
+            )
+        if tuple(weights.values()) == (-1.0, 1.0):
+            weights = dict(reversed(weights.items()))
+        return combination(self._in_order(weights))
+
+    def _in_order(self, weights: dict[str, float]) -> tuple[tuple[str, float], ...]:
+        """The terms in the order of the same sum of the tree, so that both are rounded alike."""
+        opposite = {name: -weight for name, weight in weights.items()}
+        for node in nodes.conditions(self.learned.tree):
+            match node.literal.condition:
+                case (
+                    Threshold(quantity=WeightedSum(terms=terms))
+                    | Interval(quantity=WeightedSum(terms=terms))
+                ) if dict(terms) in (weights, opposite):
+                    return tuple((name, weights[name]) for name, _ in terms)
+        return tuple(weights.items())
 
     def _feature(self, word: Word) -> Feature:
         for feature in self.learned.features:
@@ -227,6 +257,10 @@ class _Resolver:
 
     def _refuse_rule(self, why: str) -> NoReturn:
         raise RuleError(f"{self.rule.place}: {why}.")
+
+
+def _terms(side: Word | Sum) -> tuple[Term, ...]:
+    return side.terms if isinstance(side, Sum) else (Term(1.0, side),)
 
 
 def _known(quantity: Quantity) -> Formula:

@@ -64,6 +64,11 @@ class _Range:
         return math.isnan(self.at_most)
 
     @property
+    def least(self) -> float:
+        """The least number in it."""
+        return math.nextafter(self.above, math.inf)
+
+    @property
     def ends(self) -> tuple[float, float]:
         """Both ends, infinite where there is none."""
         return self.above, self.at_most if self.at_most < LARGEST else math.inf
@@ -336,15 +341,21 @@ class StateFinder:
             for name in names
         ]
         choices += [_ranges(field, cells) for _, field, cells in restricted]
-        if math.prod(map(len, choices)) > (_MOST_WEIGHED if weighed else _MOST_COMBINATIONS):
+        if math.prod(map(len, choices)) > _MOST_COMBINATIONS:
             raise Unsettled
         settled = True
+        tried = 0
         for chosen in product(*choices):
             ranges = dict(zip(names, chosen, strict=False))
             between = chosen[len(names) :]
             wanted = [
                 (quantity, its) for (quantity, _, _), its in zip(restricted, between, strict=True)
             ]
+            if not all(_within_reach(quantity, its, ranges) for quantity, its in wanted):
+                continue
+            tried += 1
+            if weighed and tried > _MOST_WEIGHED:
+                raise Unsettled
             solutions, possible = solve(ranges, wanted)
             for found in solutions:
                 moved = list(values)
@@ -418,6 +429,31 @@ def _solved(
         missing | {name: float(value) for name, value in one.items()}
         for one in (amid, highest, lowest)
     ], True
+
+
+def _within_reach(quantity: Combination, its: _Range, ranges: dict[str, _Range]) -> bool:
+    """Whether a combination can come to lie in a range, were each feature bound by its own alone.
+
+    It rises or falls with each feature, also as it is rounded.  So its least and its largest value
+    are those of the ends of the ranges, computed as the runtime does, and "no" is exact.
+    """
+    of = [(ranges[name], weight) for name, weight in quantity.terms]
+    if any(one.missing for one, _ in of):
+        return its.missing
+    if its.missing:
+        return False
+    lowest = _total((one.least if weight > 0 else one.at_most, weight) for one, weight in of)
+    highest = _total((one.at_most if weight > 0 else one.least, weight) for one, weight in of)
+    # Where both are too large for a number, their sum is none, and nothing is known.
+    return not (lowest > its.at_most or highest <= its.above)
+
+
+def _total(terms: Iterable[tuple[float, float]]) -> float:
+    """A combination of finite numbers, from left to right."""
+    total = 0.0
+    for value, weight in terms:
+        total += weight * value
+    return total
 
 
 def _choices(field: Field | None, box: Boxes) -> list[_Range]:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from rule_examples import rules as random_rules
 
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.wording import quantity_text
 from rebt_ros.logic.conditions import (
     KNOWN,
     Difference,
@@ -23,12 +24,14 @@ from rebt_ros.logic.conditions import (
     Literal,
     PreviousActionIs,
     Threshold,
+    WeightedSum,
 )
 from rebt_ros.verification import rules_file
 from rebt_ros.verification.contradictions import refuse_contradictions
 from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.formulas import AllOf, AnyOf, Formula
 from rebt_ros.verification.grammar import ConditionSyntaxError, parse
+from rebt_ros.verification.proof import Answer, check, verdicts
 from rebt_ros.verification.resolving import demands
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
@@ -57,6 +60,11 @@ def about(condition: str) -> str:
 
 
 # --- conditions -------------------------------------------------------------------------------
+
+
+def _sum(**weights: float) -> WeightedSum:
+    return WeightedSum(tuple(weights.items()))
+
 
 BELOW = Literal(Threshold("distance", math.nextafter(0.3, -1)))
 AT_MOST = some.at_most("distance", 0.3)
@@ -92,6 +100,16 @@ KNOWN_DISTANCE = some.at_most("distance", KNOWN)
             some.at_most(Difference("distance", "battery"), 0.3),
         ),
         ("distance <= battery", some.at_most(Difference("distance", "battery"), 0.0)),
+        ("-battery + distance <= 0", some.at_most(Difference("distance", "battery"), 0.0)),
+        ("distance <= 2 * battery", some.at_most(_sum(distance=1.0, battery=-2.0), 0.0)),
+        ("distance + battery <= 0.3", some.at_most(_sum(distance=1.0, battery=1.0), 0.3)),
+        ("distance -0.5*battery <= 1", some.at_most(_sum(distance=1.0, battery=-0.5), 1.0)),
+        ("−2.6 × distance + battery * 3 - docked <= -1", some.at_most(
+            _sum(distance=-2.6, battery=3.0, docked=-1.0), -1.0
+        )),
+        ("distance + 'battery' is missing", ~some.at_most(
+            _sum(distance=1.0, battery=1.0), KNOWN
+        )),
         ("not (docked or kind = cup)", AllOf(
             (~Literal(IsTrue("docked")), ~Literal(HasCategory("kind", "cup")))
         )),
@@ -113,11 +131,32 @@ def test_two_comparisons_around_a_feature_are_a_range() -> None:
 
 def test_a_name_with_hyphens_is_one_name_and_a_minus_stands_between_blanks() -> None:
     assert parse("doing Slight-Right-Turn").action.text == "Slight-Right-Turn"
-    assert parse("left - right < 0").left.subtrahend.text == "right"
+    assert parse("left - right < 0").left.terms[1].feature.text == "right"
+
+
+def test_a_sum_is_that_of_the_tree_in_whatever_order_and_with_either_sign() -> None:
+    wide = WeightedSum((("distance", 1.0), ("battery", 0.1), ("docked", -0.3)))
+    learned = some.learned(some.when(some.at_most(wide, 0.2), then=some.action("go")))
+    for text, answer in (
+        ("0.1 × battery − 0.3 × docked + distance > 0.2", Answer.PROVEN),
+        ("0.3 * docked - distance - 0.1 * battery < -0.2", Answer.PROVEN),
+        (f"{quantity_text(wide)} > 0.1", Answer.BROKEN),
+    ):
+        asked = demands(rules_file.loads(f"rules:\n- never: go\n  when: {text}\n"), learned)
+        assert [one.answer for one in verdicts(check(learned, asked), asked)] == [answer]
+
+
+def test_a_sum_that_only_touches_what_the_tree_does_is_proven() -> None:
+    close = some.at_most("distance", 0.3)
+    tree = some.when(~close, some.at_most("distance", KNOWN), then=some.action("go"))
+    learned = some.learned(tree)
+    text = "rules:\n- never: go\n  when: distance + 0.5 * battery <= 0.3 and battery >= 0\n"
+    asked = demands(rules_file.loads(text), learned)
+    assert verdicts(check(learned, asked), asked)[0].answer is Answer.PROVEN
 
 
 @settings(max_examples=200)
-@given(st.text(st.sampled_from("ab <>=!()'\"-.0159\\andort\n"), max_size=30))
+@given(st.text(st.sampled_from("ab <>=!()*+'\"-.0159\\andort\n"), max_size=30))
 def test_whatever_is_written_is_a_condition_or_is_refused_at_a_place(text: str) -> None:
     at = 0
     try:
@@ -152,6 +191,20 @@ def test_whatever_is_written_is_a_condition_or_is_refused_at_a_place(text: str) 
         ("last action < go", 21, "'=' or '!=' is expected, not '<'"),
         ("1 < 2", 9, "two numbers are compared: name a feature"),
         ("distance < distance", 20, "'distance' is compared with itself"),
+        ("2 * distance + < 1", 24, "a feature or a number is expected, not '<'"),
+        ("distance + 0.5 < 1", 20, "0.5 is added to a feature: put it on the other side of the "),
+        ("distance * battery < 1", 20, "a number is expected, not 'battery'"),
+        ("2 * 3 < 1", 13, "there is no feature '3': there are"),
+        (
+            "2 * distance < 1",
+            13,
+            "'distance' alone is multiplied: compare 'distance' itself",
+        ),
+        ("distance + 0 * battery < 1", 24, "'battery' is multiplied by 0"),
+        ("distance + battery < cup", 30, "a sum is compared with a number or with features"),
+        ("distance + battery", 27, "a comparison is expected, not the end"),
+        ("distance - battery < distance", 30, "'distance' is named twice: name it once, with one"),
+        ("distance + bettery < 1", 20, "there is no feature 'bettery' ('battery' is like it): the"),
         ("distance - kind < 1", 20, "'kind' has categories, box, cup, tool, which cannot be"),
         ("docked and 'docked is", 20, "the quote is never closed"),
     ],
