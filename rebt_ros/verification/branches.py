@@ -19,6 +19,7 @@ import numpy as np
 from rebt_ros.arrays import BoolArray, IntArray, WordArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.logic.conditions import Condition, Literal
+from rebt_ros.verification.errors import TooManyPartsError
 
 #: Most literals of all terms: where multiplying out gives more, the tree is not read as branches.
 _MOST_LITERALS: Final = 400_000
@@ -111,20 +112,63 @@ class Parted:
 
     boxes: WordArray
     acting: IntArray
-    """Which branch, -1: none, shape (boxes,)."""
+    """Which branch; the number behind the last one: none, shape (boxes,)."""
     origin: IntArray
     """Which box of the start each one is a part of, shape (boxes,)."""
 
 
-def parted(branches: Sequence[Branch], mask: _Mask, start: WordArray) -> Parted:
+#: Which of the boxes that are left are worth going on with, given them and their origin.
+_Worth: TypeAlias = Callable[[WordArray, IntArray], BoolArray]
+
+
+def parted(branches: Sequence[Branch], mask: _Mask, start: WordArray, most: int) -> Parted:
     """Splits boxes until it is known of each which branch acts.
 
     Args:
         branches: In their order.
         mask: Where their conditions hold, as `Grid.mask` says.
         start: The boxes, shape (words, boxes).
+        most: How many parts there may be.
+
+    Raises:
+        TooManyPartsError: There would be more.
     """
-    return _Parting(branches, mask, len(start)).run(start)
+    # Every branch differs from every other one.
+    apart = np.tile(np.arange(len(branches) + 1), (start.shape[1], 1))
+    return _Parting(branches, mask, apart, most).run(start)
+
+
+def where_some_act(
+    branches: Sequence[Branch],
+    mask: _Mask,
+    start: WordArray,
+    wanted: BoolArray,
+    most: int,
+    worth: _Worth | None = None,
+) -> tuple[WordArray, IntArray]:
+    """The parts of boxes in which one of some branches acts.
+
+    Nothing is asked that only tells wanted branches, or only unwanted ones, from each other: where
+    branches overlap, these are far fewer parts than those that `parted` finds.
+
+    Args:
+        branches: In their order.
+        mask: As for `parted`.
+        start: The boxes, shape (words, boxes).
+        wanted: Which branches are wanted in each box, at last whether it is wanted that none acts,
+            shape (boxes, branches + 1).
+        most: How many parts there may be, also unwanted ones.
+        worth: Tells which boxes to go on with; all by default.
+
+    Returns:
+        The parts, and which box of the start each one is a part of, shape (parts,).
+
+    Raises:
+        TooManyPartsError: There would be more.
+    """
+    found = _Parting(branches, mask, wanted.astype(np.int64), most, worth).run(start)
+    there = wanted[found.origin, found.acting]
+    return found.boxes[:, there], found.origin[there]
 
 
 @dataclass(eq=False, slots=True)
@@ -158,9 +202,40 @@ class _Front:
         self.origin = self.origin[waiting]
         return found
 
+    def keep(self, kept: BoolArray) -> None:
+        """Gives up all other boxes; `fresh` does not count before the next split."""
+        pairs = kept[self.box]
+        questions = pairs[self.pair]
+        self.pair = (np.cumsum(pairs) - 1)[self.pair[questions]]
+        self.literal = self.literal[questions]
+        self.box, self.term = (np.cumsum(kept) - 1)[self.box[pairs]], self.term[pairs]
+        self.boxes, self.best = self.boxes[:, kept], self.best[kept]
+        self.origin = self.origin[kept]
+
 
 class _Parting:
-    def __init__(self, branches: Sequence[Branch], mask: _Mask, words: int) -> None:
+    """Splits boxes.
+
+    Args:
+        branches: In their order.
+        mask: As for `parted`.
+        kinds: Of each box of the start a number for each branch, at last for none: those with the
+            same one need not be told from each other, shape (boxes, branches + 1).
+        most: How many parts there may be.
+        worth: Tells which boxes to go on with; all by default.
+    """
+
+    def __init__(
+        self,
+        branches: Sequence[Branch],
+        mask: _Mask,
+        kinds: IntArray,
+        most: int,
+        worth: _Worth | None = None,
+    ) -> None:
+        self._kinds = kinds
+        self._left = most
+        self._worth = worth
         self._none = len(branches)
         # Of literals: the condition, and whether it has to hold.
         number: dict[Condition, int] = {}
@@ -181,22 +256,26 @@ class _Parting:
         self._positive = np.array(positive, dtype=bool)
         masks = [mask(one) for one in number]
         width = max((len(bits) for _, bits in masks), default=1)
-        self._words = np.full((width, len(masks)), words)
+        # A field of fewer words than others goes on with an empty one, the last of all.
+        self._words = np.full((width, len(masks)), -1)
         self._masks = np.zeros((width, len(masks)), dtype=np.uint64)
         for place, (its, bits) in enumerate(masks):
             self._words[: len(bits), place] = np.arange(its.start, its.stop)
             self._masks[: len(bits), place] = bits
 
     def run(self, start: WordArray) -> Parted:
-        """Splits all boxes."""
+        """Splits all boxes; where no branch acts, the number behind the last one does.
+
+        Raises:
+            TooManyPartsError: They fall into more parts than there may be.
+        """
         at_a_time = max(1, _QUESTIONS_AT_A_TIME // max(1, len(self._term)))
         done: list[Parted] = []
         for first in range(0, max(1, start.shape[1]), at_a_time):
             done += self._split_up(self._front(start[:, first : first + at_a_time], first))
-        acting = np.concatenate([part.acting for part in done])
         return Parted(
             np.concatenate([part.boxes for part in done], axis=1),
-            np.where(acting == self._none, -1, acting),
+            np.concatenate([part.acting for part in done]),
             np.concatenate([part.origin for part in done]),
         )
 
@@ -204,9 +283,15 @@ class _Parting:
         """Splits boxes until none is left of which it is not known which branch acts."""
         while True:
             self._answer(front)
-            yield front.decided()
+            decided = front.decided()
+            yield decided
+            if self._worth is not None and len(front.box):
+                front.keep(self._worth(front.boxes[:-1], front.origin))
             if not len(front.box):
                 return
+            self._left -= decided.boxes.shape[1]
+            if front.boxes.shape[1] > self._left:
+                raise TooManyPartsError
             self._split(front)
 
     def _front(self, start: WordArray, first: int) -> _Front:
@@ -242,6 +327,12 @@ class _Parting:
         rank = self._rank[front.term]
         np.minimum.at(front.best, front.box[always], rank[always])
         kept = ~never & ~always & (rank < front.best[front.box])
+        # What is asked behind the last branch that would differ from the best one makes none.
+        kind = self._kinds[front.origin[front.box], rank]
+        differs = kept & (kind != self._kinds[front.origin, front.best][front.box])
+        last = np.full(front.boxes.shape[1], -1)
+        np.maximum.at(last, front.box[differs], rank[differs])
+        kept &= rank <= last[front.box]
         unanswered &= kept[pair]
         front.pair = (np.cumsum(kept) - 1)[pair[unanswered]]
         front.literal = literal[unanswered]

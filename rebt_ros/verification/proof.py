@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import reduce
+from typing import Final
 
 import numpy as np
 
 from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.behavior_tree.condition_tests import holds_after
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.prediction import States, choose, history_columns
-from rebt_ros.behavior_tree.runtime import AlwaysRunning, SucceedAtOnce, TreeRuntime, executable
-from rebt_ros.demonstration.last_action import ActionHistory
+from rebt_ros.behavior_tree.prediction import States, history_columns
+from rebt_ros.behavior_tree.runtime import executable
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import Condition, HistoryCondition, Literal
-from rebt_ros.verification.errors import RuleError
+from rebt_ros.logic.conditions import Condition, Literal
+from rebt_ros.verification.branches import branches_of
+from rebt_ros.verification.commanding import Commands
+from rebt_ros.verification.errors import RuleError, TooManyPartsError
 from rebt_ros.verification.formulas import AllOf, Formula, conditions_of
 from rebt_ros.verification.grid import Boxes, Grid
 from rebt_ros.verification.reference import Reference, of_table, of_tree
 from rebt_ros.verification.rules import Demand
+from rebt_ros.verification.searching import Broken, found_in, searched
 from rebt_ros.verification.states import Near, Point, StateFinder, Unsettled
 from rebt_ros.verification.sweep import Results, Sweep, Ticks, remembers, sweep
 
@@ -82,7 +84,7 @@ class Verdict:
     witness: Witness | None = None
     """Of a broken rule."""
     region: Boxes | None = None
-    """Of a broken rule, the boxes of all states in which it is broken."""
+    """Of a broken rule, all states in which it is broken; None if they are too many."""
     why: str = ""
     """Of a rule that is unknown: what it depends on."""
     coverage: Coverage | None = None
@@ -95,8 +97,6 @@ class ChannelProof:
 
     channel: str
     grid: Grid
-    first: Sweep
-    """What the tree does in a first tick."""
     verdicts: tuple[Verdict, ...]
 
 
@@ -170,6 +170,10 @@ def grid_of(
     return Grid(learned.features, asked)
 
 
+#: Into how many parts a list of branches may divide the states to be looked at all.
+_MOST_PARTS: Final = 10_000
+
+
 @dataclass(frozen=True, slots=True)
 class _ChannelCheck:
     learned: LearnedTree
@@ -180,68 +184,45 @@ class _ChannelCheck:
 
     def proof(self, demands: Sequence[Demand]) -> ChannelProof:
         grid = grid_of(self.learned, [self.tree], [one.region for one in demands])
-        first = sweep(self.tree, grid, self.results, Ticks.FIRST)
+        finder = StateFinder(grid, self.learned.features, self.shown)
+        commands = Commands(self.learned, self.channel, self.tree, self.results)
+        broken = self._broken(demands, grid, finder, commands)
         any_tick = (
             sweep(self.tree, grid, self.results, Ticks.ANY)
             if demands and remembers(self.tree, self.results)
             else None
         )
-        finder = StateFinder(grid, self.learned.features, self.shown)
-        regions = [breaking(one, grid, first) for one in demands]
-        candidates = self._candidates(finder, regions)
-        commands = self._commands(
-            [candidate.point for candidate in candidates if isinstance(candidate, Near)]
+        witnessed = iter(
+            commands.of([one.nearest.point for one in broken if isinstance(one.nearest, Near)])
         )
         found = []
-        for demand, region, near in zip(demands, regions, candidates, strict=True):
+        for demand, its in zip(demands, broken, strict=True):
             coverage = self._coverage(demand)
-            if isinstance(near, Near):
-                witness = self._witness(demand, near, next(commands))
-                found.append(Verdict(demand, Answer.BROKEN, witness, region, coverage=coverage))
+            if isinstance(its.nearest, Near):
+                witness = self._witness(demand, its.nearest, next(witnessed))
+                found.append(Verdict(demand, Answer.BROKEN, witness, its.region, coverage=coverage))
                 continue
-            why = "" if near is None else "it depends on which differences of features there are"
+            why = its.nearest or ""
             if any_tick is not None and not why:
                 why = self._why_unknown(demand, grid, any_tick, finder)
             answer = Answer.UNKNOWN if why else Answer.PROVEN
             found.append(Verdict(demand, answer, why=why, coverage=coverage))
-        return ChannelProof(self.channel, grid, first, tuple(found))
+        return ChannelProof(self.channel, grid, tuple(found))
 
-    def _candidates(
-        self, finder: StateFinder, regions: Sequence[Boxes]
-    ) -> list[Near | Unsettled | None]:
-        """Of each region, the state that is nearest to what was shown."""
-        # All at once: what numpy does once per call then does not matter.
-        together = np.concatenate([finder.no_boxes, *regions], axis=1)
-        distances, rows = finder.closest(together)
-        found: list[Near | Unsettled | None] = []
-        end = 0
-        for region in regions:
-            start, end = end, end + region.shape[1]
-            try:
-                found.append(finder.first(region, distances[start:end], rows[start:end]))
-            except Unsettled as unsettled:
-                found.append(unsettled)
-        return found
-
-    def _commands(self, points: Sequence[Point]) -> Iterator[nodes.Action | None]:
-        """What the tree commands in some states, asked of another program than the proof."""
-        tree = self.tree
-        if tree is None or not points:
-            return iter([None] * len(points))
-        repeats = any(isinstance(node, nodes.Repeater) for node in nodes.walk(tree))
-        if repeats or self.results is Results.REPORTED:
-            return (command_in(self.learned, self.channel, point, self.results) for point in points)
-        histories = [
-            ActionHistory() if point.before is None else point.before.history() for point in points
-        ]
-
-        def holds(condition: HistoryCondition) -> BoolArray:
-            return np.array([holds_after(history, condition) for history in histories], dtype=bool)
-
-        values = np.array([point.values for point in points]).reshape(len(points), -1)
-        actions = nodes.actions(tree)
-        chosen = choose(tree, actions, States(self.learned.features, values, holds))
-        return (actions[code] if code >= 0 else None for code in chosen.tolist())
+    def _broken(
+        self, demands: Sequence[Demand], grid: Grid, finder: StateFinder, commands: Commands
+    ) -> list[Broken]:
+        """Where a first tick breaks each rule."""
+        try:
+            first = sweep(self.tree, grid, self.results, Ticks.FIRST, most=_MOST_PARTS)
+        except TooManyPartsError:
+            assert self.tree is not None
+            branches = branches_of(self.tree)
+            if branches is None:
+                raise
+            leaves = [node for node in nodes.walk(self.tree) if isinstance(node, nodes.Action)]
+            return searched(demands, branches, leaves, grid, finder, commands)
+        return found_in([breaking(one, grid, first) for one in demands], finder)
 
     def _why_unknown(self, demand: Demand, grid: Grid, any_tick: Sweep, finder: StateFinder) -> str:
         try:
@@ -275,21 +256,6 @@ class _ChannelCheck:
         done = table.chosen == code
         breaking_rows = about & (done if demand.forbids is not None else ~done)
         return Coverage(int(about.sum()), len(table), int(breaking_rows.sum()))
-
-
-def command_in(
-    learned: LearnedTree, channel: str, point: Point, results: Results = Results.AT_ONCE
-) -> nodes.Action | None:
-    """What a tree commands on a channel in a first tick in a state; None: nothing."""
-    history = ActionHistory() if point.before is None else point.before.history()
-    runtime = TreeRuntime(
-        learned,
-        AlwaysRunning() if results is Results.REPORTED else SucceedAtOnce(),
-        executable(learned.tree),
-        {channel: history},
-    )
-    commands = runtime.tick(point.values).commands
-    return next((command for command in commands if command.channel == channel), None)
 
 
 def breaking(demand: Demand, grid: Grid, done: Sweep) -> Boxes:

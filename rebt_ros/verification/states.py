@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -182,6 +183,37 @@ class StateFinder:
                 return Near(point, row, float(distances[place]))
         if unsettled:
             raise Unsettled
+        return None
+
+    def beside(self, boxes: Boxes, at_a_time: int) -> Iterator[list[Near]]:
+        """States in some boxes, each the nearest to a row, those first that are closest to theirs.
+
+        Args:
+            boxes: Any number of them; of many, only the row that is nearest to each is looked at.
+            at_a_time: How many states to look for together.
+        """
+        count = len(self._shown)
+        if 0 < boxes.shape[1] * count <= _COMPARED_AT_A_TIME:
+            distances = self._distances(boxes).reshape(-1)
+            box, row = np.divmod(np.arange(len(distances)), count)
+        else:
+            distances, row = self.closest(boxes)
+            box = np.arange(boxes.shape[1])
+        order = np.argsort(distances, kind="stable")
+        for start in range(0, len(order), at_a_time):
+            places = order[start : start + at_a_time]
+            yield [
+                near
+                for one in places
+                if (near := self._near(boxes[:, box[one]], int(row[one]), float(distances[one])))
+            ]
+
+    def _near(self, box: Boxes, row: int, distance: float) -> Near | None:
+        """A state in a box near a row, -1 for none; None where there is none as far as is known."""
+        beside = row if row >= 0 else None
+        with contextlib.suppress(Unsettled):
+            point = self.point(box, beside)
+            return None if point is None else Near(point, beside, distance)
         return None
 
     def closest(self, boxes: Boxes) -> tuple[FloatArray, IntArray]:

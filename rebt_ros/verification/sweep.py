@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import reduce
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -27,7 +27,11 @@ from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.logic.conditions import Literal
 from rebt_ros.verification.branches import branches_of, parted
+from rebt_ros.verification.errors import TooManyPartsError
 from rebt_ros.verification.grid import Boxes, Grid
+
+#: Most parts that all states are looked at in.
+_MOST_PARTS: Final = 200_000
 
 
 class Results(Enum):
@@ -90,6 +94,7 @@ def sweep(
     start: Boxes | None = None,
     *,
     visits: bool = False,
+    most: int = _MOST_PARTS,
 ) -> Sweep:
     """What a tree does.
 
@@ -101,15 +106,20 @@ def sweep(
         start: The states to look at; by default all.
         visits: Whether to visit conditions also where it is clear what comes of their rule, which
             takes longer; otherwise there are no `Sweep.visits`.
+        most: Into how many parts a list of branches may divide the states.
+
+    Raises:
+        TooManyPartsError: It does different things in more parts.
     """
     start = grid.everything() if start is None else start
     branches = branches_of(tree) if tree and ticks is Ticks.FIRST and not visits else None
     if tree is None or branches is None:
         return _Sweeper(tree, grid, results, ticks, visits).run(start)
     # The same answer, much sooner.
-    found = parted(branches, grid.mask, start)
+    found = parted(branches, grid.mask, start, most)
     leaves = tuple(node for node in nodes.walk(tree) if isinstance(node, nodes.Action))
-    return Sweep(grid, leaves, found.boxes, found.acting, found.origin, ())
+    acting = np.where(found.acting == len(leaves), -1, found.acting)
+    return Sweep(grid, leaves, found.boxes, acting, found.origin, ())
 
 
 def remembers(tree: nodes.Node | None, results: Results) -> bool:
@@ -226,6 +236,8 @@ class _Sweeper:
                 return {}
 
     def _visit(self, step: _Step, paths: _Paths) -> _Ends:
+        if paths.shape[1] > _MOST_PARTS:
+            raise TooManyPartsError
         match step.node:
             case nodes.Condition(literal=literal):
                 ends = self._test(literal, paths)

@@ -7,6 +7,7 @@ import os
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import rule_examples as written
 import strategies as some
 from hypothesis import HealthCheck, given, settings
@@ -20,6 +21,7 @@ from rebt_ros.logic.conditions import (
     Interval,
     Threshold,
 )
+from rebt_ros.verification import proof, searching
 from rebt_ros.verification.proof import Answer, Coverage, ShownRow, check, grid_of, verdicts
 from rebt_ros.verification.resolving import demands
 from rebt_ros.verification.rules_file import loads
@@ -88,6 +90,37 @@ def test_answers_are_those_of_brute_force_over_all_cells(
             assert verdict.answer is not Answer.PROVEN
             if not differs:
                 assert verdict.answer is Answer.BROKEN
+
+
+@settings(max_examples=40 * MORE, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    some.rule_trees(),
+    st.lists(written.rules(), min_size=4, max_size=4),
+    st.lists(some.states, max_size=4),
+    st.sampled_from((1, 1_000_000)),
+)
+def test_what_is_searched_where_branches_overlap_is_what_is_found_by_looking_at_all(
+    tree: nodes.Node,
+    rules: list[written.WrittenRule],
+    shown: list[tuple[float, ...]],
+    most_nearer: int,
+) -> None:
+    learned, tables = some.learned(tree), []
+    if shown:
+        tables = [some.table(shown, [0] * len(shown))]
+    asked = [demands(loads(rule.text), learned)[0] for rule in rules]
+    known = verdicts(check(learned, asked, tables), asked)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(proof, "_MOST_PARTS", -1)
+        patched.setattr(searching, "_MOST_NEARER", most_nearer)
+        found = verdicts(check(learned, asked, tables), asked)
+    for rule, one, other in zip(rules, known, found, strict=True):
+        assert one.answer is other.answer
+        if other.answer is Answer.BROKEN:
+            state = _single(other.witness.point)
+            assert rule.broken(state, written.commands(executable(tree), state)).all()
+            if most_nearer > 1 and not rule.when.differs and not _compares(tree):
+                assert other.witness.distance == pytest.approx(one.witness.distance)
 
 
 ended = st.lists(st.sampled_from((Status.SUCCESS, Status.FAILURE, Status.RUNNING)), max_size=60)
