@@ -90,6 +90,8 @@ def _lines(checked: Checked, most: int) -> Iterator[str]:
             yield f"         {line}"
     if checked.verdicts:
         yield ""
+    if checked.not_found:
+        yield f"What else is noticeable is not known: {checked.not_found}"
     several = len(checked.findings) > 1
     wording = Wording(checked.learned)
     for findings in checked.findings:

@@ -18,6 +18,7 @@ from rebt_ros.offline.trees_and_rows import as_learned_tree, demonstrations_for
 from rebt_ros.storage.input_options import InputOptions
 from rebt_ros.verification.comparing import Comparison, compare
 from rebt_ros.verification.contradictions import agreeing_demands
+from rebt_ros.verification.errors import TooManyPartsError
 from rebt_ros.verification.explaining import Explanation
 from rebt_ros.verification.explaining import explain as explain_state
 from rebt_ros.verification.findings import Findings, find
@@ -38,6 +39,9 @@ class Checked:
     verdicts: tuple[Verdict, ...]
     """Of each rule, in their order."""
     findings: tuple[Findings, ...]
+    """Of each channel; none where there are too many states to look at, see `not_found`."""
+    not_found: str
+    """Why there are no findings; empty where there are."""
     comparisons: tuple[Comparison, ...]
     """With another tree, where one was given."""
     rows: tuple[DemonstrationTable, ...]
@@ -88,11 +92,19 @@ def check(
     asked = () if ruled is None else agreeing_demands(ruled, learned)
     tables = _rows(learned, inputs, reading)
     proofs = prove(learned, asked, tables, results)
+    findings: tuple[Findings, ...] = ()
+    not_found = ""
+    try:
+        findings = find(learned, tables, results)
+    except TooManyPartsError as err:
+        # Rules are proven without looking at all parts.
+        not_found = str(err)
     return Checked(
         learned,
         proofs,
         verdicts(proofs, asked),
-        find(learned, tables, results),
+        findings,
+        not_found,
         () if against is None else compare(learned, as_learned_tree(against), tables),
         tables,
         results,

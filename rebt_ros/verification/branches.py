@@ -26,6 +26,9 @@ _MOST_LITERALS: Final = 400_000
 #: Boxes times literals that are looked at together.
 _QUESTIONS_AT_A_TIME: Final = 2_000_000
 
+#: How many times as many counters as questions it is quicker to have than to sort the questions.
+_SPARSE: Final = 4
+
 _Term: TypeAlias = tuple[Literal, ...]
 #: Where a condition holds: the words of a box that it is about, and their bits.
 _Mask: TypeAlias = Callable[[Condition], tuple[slice, WordArray]]
@@ -342,12 +345,7 @@ class _Parting:
         """Splits each box on the condition that is asked most; the insides come first."""
         count, pairs = front.boxes.shape[1], len(front.box)
         box, asked = front.box[front.pair], self._condition[front.literal]
-        conditions = self._words.shape[1]
-        keys, votes = np.unique(box * conditions + asked, return_counts=True)
-        # Of each box, the last one in this order stays.
-        keys = keys[np.argsort(votes, kind="stable")]
-        chosen = np.zeros(count, dtype=np.int64)
-        chosen[keys // conditions] = keys % conditions
+        chosen = _most_frequent(box, asked, count, self._words.shape[1])
         front.boxes = self._halves(front.boxes, chosen)
         # Questions about other fields are answered as before.
         front.fresh = np.tile(self._words[0, asked] == self._words[0, chosen[box]], 2)
@@ -374,3 +372,17 @@ class _Parting:
             inside[words[split], places] &= masks[split]
             outside[words[split], places] &= ~masks[split]
         return np.concatenate([inside, outside], axis=1)
+
+
+def _most_frequent(box: IntArray, asked: IntArray, boxes: int, conditions: int) -> IntArray:
+    """The condition that is asked most often of each box, shape (boxes,)."""
+    keys = box * conditions + asked
+    if boxes * conditions <= _SPARSE * len(keys):
+        votes = np.bincount(keys, minlength=boxes * conditions).reshape(boxes, conditions)
+        return np.asarray(votes.argmax(axis=1))
+    different, counts = np.unique(keys, return_counts=True)
+    # Of each box, the last one in this order stays: the most frequent, the first of several.
+    different = different[np.lexsort((-different, counts))]
+    chosen = np.zeros(boxes, dtype=np.int64)
+    chosen[different // conditions] = different % conditions
+    return chosen

@@ -22,6 +22,7 @@ from rebt_ros.verification.acting import (
     recorded,
     trace,
 )
+from rebt_ros.verification.errors import TooManyPartsError
 from rebt_ros.verification.grid import Boxes, Field, Grid
 from rebt_ros.verification.proof import grid_of, policies_of
 from rebt_ros.verification.reference import Reference, of_table, of_tree
@@ -139,7 +140,12 @@ def _explained(
     grid = grid_of(learned, [tree])
     flips: tuple[Flip, ...] | None = None
     if changes:
-        done = sweep(tree, grid, Results.AT_ONCE, Ticks.FIRST)
+        try:
+            done = sweep(tree, grid, Results.AT_ONCE, Ticks.FIRST)
+        except TooManyPartsError:
+            # Changes of a single feature can still be looked at.
+            start = _one_free(grid, learned, values, history)
+            done = sweep(tree, grid, Results.AT_ONCE, Ticks.FIRST, start)
         shown = of_tree(learned, channel) if table is None else of_table(table)
         flips = tuple(_flips(learned, grid, done, values, history, action, shown))
     support = None
@@ -180,6 +186,24 @@ def _flips(
         flip = _flip(learned, grid, done, boxes, origin, None)
         if flip is not None:
             yield flip
+
+
+def _one_free(
+    grid: Grid, learned: LearnedTree, values: Sequence[float], history: ActionHistory
+) -> Boxes:
+    """For each feature, the states that differ from one in nothing but that feature."""
+    now = _cells_of(grid, learned, values, history)
+    everything = grid.everything()
+    free = [everything[:, :0]]
+    for feature in learned.features:
+        if grid.field(feature.name) is not None:
+            others = [
+                place
+                for place, field in enumerate(grid.fields)
+                if not _concerns(field, feature.name)
+            ]
+            free.append(_pinned(grid, everything, now, others))
+    return np.concatenate(free, axis=1)
 
 
 def _cells_of(

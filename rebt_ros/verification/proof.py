@@ -170,8 +170,10 @@ def grid_of(
     return Grid(learned.features, asked)
 
 
-#: Into how many parts a list of branches may divide the states to be looked at all.
-_MOST_PARTS: Final = 10_000
+#: Into how many parts a list of branches may divide the states for all to be looked at, also per
+#: node: more than branches do that hardly overlap.
+_MOST_PARTS: Final = 2_000
+_MOST_PER_NODE: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,8 +215,10 @@ class _ChannelCheck:
         self, demands: Sequence[Demand], grid: Grid, finder: StateFinder, commands: Commands
     ) -> list[Broken]:
         """Where a first tick breaks each rule."""
+        size = 0 if self.tree is None else nodes.size(self.tree)
+        most = _MOST_PARTS + _MOST_PER_NODE * size
         try:
-            first = sweep(self.tree, grid, self.results, Ticks.FIRST, most=_MOST_PARTS)
+            first = sweep(self.tree, grid, self.results, Ticks.FIRST, most=most)
         except TooManyPartsError:
             assert self.tree is not None
             branches = branches_of(self.tree)

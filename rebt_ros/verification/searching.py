@@ -25,7 +25,7 @@ from rebt_ros.verification.states import Near, StateFinder, Unsettled
 #: Into how many parts the states may fall that are nearer to what was shown than a known one.
 _MOST_NEARER: Final = 20_000
 #: ... and those that a rule is about.
-_MOST_ASKED: Final = 200_000
+_MOST_ASKED: Final = 50_000
 #: Beside how many rows it is tried whether a state breaks a rule, at a time and in all.
 _TRIED_AT_A_TIME: Final = 8
 _MOST_TRIED: Final = 64
@@ -146,10 +146,13 @@ class _Search:
             return []
         boxes = np.concatenate([one.boxes for one in asked], axis=1)
         rule = np.repeat(np.arange(len(asked)), [one.boxes.shape[1] for one in asked])
-        limits = np.array(distances)
+        limits = np.array(distances)[rule]
+        rows_near = self.finder.near(boxes, limits)
+        if rows_near is None:
+            return [None] * len(asked)
 
-        def is_nearer(boxes: Boxes, origin: IntArray) -> BoolArray:
-            return self.finder.closest(boxes)[0] < limits[rule[origin]]
+        def is_nearer(parts: Boxes, origin: IntArray) -> BoolArray:
+            return rows_near.closest(parts)[0] < limits[origin]
 
         wanted = np.stack([one.wanted for one in asked])[rule]
         try:

@@ -216,6 +216,30 @@ class StateFinder:
             return None if point is None else Near(point, beside, distance)
         return None
 
+    def near(self, boxes: Boxes, limits: FloatArray) -> StateFinder | None:
+        """The same with nothing but the rows that are nearer to some box than a limit.
+
+        Args:
+            boxes: Any number of them.
+            limits: Of each box.
+
+        Returns:
+            None if there are no such rows.
+        """
+        kept = np.zeros(len(self._shown), dtype=bool)
+        for part in self._parts(boxes.shape[1]):
+            kept |= (self._distances(boxes[:, part]) < limits[part, np.newaxis]).any(axis=0)
+        if not kept.any():
+            return None
+        rows = Reference(self._shown.low[kept], self._shown.high[kept], self._shown.scale, None)
+        return StateFinder(self._grid, self._features, rows, self._movable)
+
+    def _parts(self, boxes: int) -> Iterator[slice]:
+        """Boxes that can be compared with all rows at a time."""
+        at_a_time = max(1, _COMPARED_AT_A_TIME // max(1, len(self._shown)))
+        for start in range(0, boxes, at_a_time):
+            yield slice(start, start + at_a_time)
+
     def closest(self, boxes: Boxes) -> tuple[FloatArray, IntArray]:
         """How far each box is from the row that is nearest to it, and which row that is.
 
@@ -226,9 +250,7 @@ class StateFinder:
         if not len(self._shown):
             return np.zeros(count), np.full(count, -1)
         distances, rows = np.empty(count), np.empty(count, dtype=np.int64)
-        at_a_time = max(1, _COMPARED_AT_A_TIME // len(self._shown))
-        for start in range(0, count, at_a_time):
-            part = slice(start, start + at_a_time)
+        for part in self._parts(count):
             all_of = self._distances(boxes[:, part])
             rows[part] = np.argmin(all_of, axis=1)
             distances[part] = np.min(all_of, axis=1)

@@ -47,7 +47,7 @@ def details(
     grid = _proof_of(verdict, proofs).grid
     if verdict.why:
         yield verdict.why
-    if witness is not None and verdict.region is not None:
+    if witness is not None:
         state = point_text(witness.point, grid, learned.features)
         yield f"where {state or 'nothing is asked'}: {_done(verdict)}"
         if witness.row is not None:
@@ -56,7 +56,10 @@ def details(
                 f"nearest row that was shown: row {row.row} of {row.demonstration} "
                 f"({name_text(row.action)})"
             )
-        yield from regions("broken", verdict.region, grid, most)
+        if verdict.region is None:
+            yield "broken in more regions than can be listed"
+        else:
+            yield from regions("broken", verdict.region, grid, most)
     if verdict.coverage is not None:
         yield _covered(verdict)
 

@@ -16,7 +16,9 @@ from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
 from rebt_ros.commands import explain as command
 from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.storage.tree_file import write_tree
+from rebt_ros.verification import explaining
 from rebt_ros.verification.explaining import explain
+from rebt_ros.verification.sweep import Sweep
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
 NEAR, LOW = some.at_most("distance", 0.3), some.at_most("battery", 0.2)
@@ -50,6 +52,21 @@ def test_the_action_is_what_a_tick_commands_and_each_change_leads_to_what_it_say
                 if old != new and not (math.isnan(old) and math.isnan(new))
             ]
             assert changed == [flip.feature]
+
+
+def test_changes_of_single_features_are_the_same_where_branches_overlap_too_much() -> None:
+    learned, state = some.learned(CAREFUL), (0.5, 0.5, 0.0, 0.0)
+    [known] = explain(learned, state)
+    whole = explaining.sweep
+
+    def limited(*arguments: object) -> Sweep:
+        return whole(*arguments, most=3 if len(arguments) > 4 else 0)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(explaining, "sweep", limited)
+        [found] = explain(learned, state)
+    assert known.flips
+    assert found.flips == known.flips
 
 
 def explained(

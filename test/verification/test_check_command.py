@@ -9,7 +9,9 @@ import strategies as some
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands import check
+from rebt_ros.demonstration.schema import Feature
 from rebt_ros.storage.tree_file import write_tree
+from rebt_ros.verification import proof, sweep
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
 NEAR = some.at_most("distance", 0.3)
@@ -150,3 +152,35 @@ def test_channels_in_one_policy_are_refused(
     with pytest.raises(SystemExit):
         check.main([tree_file(tmp_path, mixed)])
     assert "mixes the channel 'base' with others" in capsys.readouterr().err
+
+
+def test_where_branches_overlap_too_much_rules_are_answered_all_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Of twelve features, each branch asks two: more parts than the few that are looked at here.
+    names = [f"f{place}" for place in range(12)]
+    asked = [
+        (some.at_most(one, 0.3), ~some.at_most(other, 0.6))
+        for place, one in enumerate(names)
+        for other in names[place + 1 :]
+    ]
+    tree = nodes.Selector(
+        (*(some.when(*tests, then=(GO, TURN)[k % 2]) for k, tests in enumerate(asked)), WAIT)
+    )
+    write_tree(tmp_path / "tree.json", some.learned(tree, [Feature(name) for name in names]))
+    text = "- never: go\n  when: f0 <= 0.1\n- never: wait\n  when: f0 <= 0.1 and f1 > 0.6\n"
+    text += "- never: wait\n  when: f0 > 0.5\n"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(proof, "_MOST_PARTS", 5)
+        patched.setattr(proof, "_MOST_PER_NODE", 0)
+        patched.setattr(sweep, "_MOST_PARTS", 5)
+        with pytest.raises(SystemExit):
+            check.main([str(tmp_path / "tree.json"), "--rules", rules_file(tmp_path, text)])
+    out = capsys.readouterr().out
+    assert "BROKEN   never go when f0 <= 0.1" in out
+    assert "broken where " in out
+    # A state beside what is shown breaks it: other regions are not looked at.
+    assert "BROKEN   never wait when f0 > 0.5" in out
+    assert "broken in more regions than can be listed" in out
+    assert "proven   never wait when f0 <= 0.1 and f1 > 0.6" in out
+    assert "What else is noticeable is not known: the branches of the tree overlap" in out

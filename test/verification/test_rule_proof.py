@@ -112,6 +112,7 @@ def test_what_is_searched_where_branches_overlap_is_what_is_found_by_looking_at_
     known = verdicts(check(learned, asked, tables), asked)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(proof, "_MOST_PARTS", -1)
+        patched.setattr(proof, "_MOST_PER_NODE", 0)
         patched.setattr(searching, "_MOST_NEARER", most_nearer)
         found = verdicts(check(learned, asked, tables), asked)
     for rule, one, other in zip(rules, known, found, strict=True):
