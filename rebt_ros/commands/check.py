@@ -16,8 +16,8 @@ from rebt_ros.storage.tree_file import write_tree
 from rebt_ros.verification.comparing import Comparison
 from rebt_ros.verification.describing import action_text
 from rebt_ros.verification.findings import Findings
-from rebt_ros.verification.proof import Answer
 from rebt_ros.verification.sweep import Results
+from rebt_ros.verification.verdict import Answer
 from rebt_ros.verification.verdict_text import details, regions
 
 #: Exit code where a rule is broken or unknown.

@@ -22,11 +22,11 @@ from rebt_ros.verification.errors import TooManyPartsError
 from rebt_ros.verification.explaining import Explanation
 from rebt_ros.verification.explaining import explain as explain_state
 from rebt_ros.verification.findings import Findings, find
-from rebt_ros.verification.proof import Answer, ChannelProof, Verdict, verdicts
 from rebt_ros.verification.proof import check as prove
 from rebt_ros.verification.repairing import Repaired, repair
 from rebt_ros.verification.rules import RuleSet
 from rebt_ros.verification.sweep import Results
+from rebt_ros.verification.verdict import Answer, ChannelProof, Verdict, verdicts
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -22,9 +22,10 @@ from rebt_ros.logic.conditions import Interval, Literal, Quantity, Threshold
 from rebt_ros.studio.tree_view import Json, suggestion_views, tree_view
 from rebt_ros.trial.tally import Tally
 from rebt_ros.verification.contradictions import agreeing_demands
-from rebt_ros.verification.proof import Answer, check, verdicts
+from rebt_ros.verification.proof import check
 from rebt_ros.verification.robot_rules import rules_of, together
 from rebt_ros.verification.rules import RuleSet
+from rebt_ros.verification.verdict import Answer, verdicts
 from rebt_ros.verification.verdict_text import details
 
 #: Levels on the chart.

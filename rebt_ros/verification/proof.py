@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import Enum
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Final
 
 import numpy as np
 
 from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
+from rebt_ros.behavior_tree.condition_tests import holds_after
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.prediction import States, history_columns
-from rebt_ros.behavior_tree.runtime import executable
+from rebt_ros.behavior_tree.prediction import Plan, States, history_columns
+from rebt_ros.behavior_tree.runtime import AlwaysRunning, SucceedAtOnce, TreeRuntime, executable
+from rebt_ros.demonstration.last_action import ActionHistory
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import Condition, Literal
+from rebt_ros.logic.conditions import Condition, HistoryCondition, Literal
 from rebt_ros.verification.branches import branches_of
-from rebt_ros.verification.commanding import Commands
 from rebt_ros.verification.errors import RuleError, TooManyPartsError
 from rebt_ros.verification.formulas import AllOf, Formula, conditions_of
 from rebt_ros.verification.grid import Boxes, Grid
@@ -27,77 +27,7 @@ from rebt_ros.verification.rules import Demand
 from rebt_ros.verification.searching import Broken, found_in, searched
 from rebt_ros.verification.states import Near, Point, StateFinder, Unsettled
 from rebt_ros.verification.sweep import Results, Sweep, Ticks, remembers, sweep
-
-
-class Answer(Enum):
-    """What is known of a rule."""
-
-    PROVEN = "proven"
-    """The tree keeps it in every state, whatever was done before."""
-    BROKEN = "broken"
-    """There is a state in which it does not."""
-    UNKNOWN = "unknown"
-    """Neither was shown."""
-
-
-@dataclass(frozen=True, slots=True)
-class ShownRow:
-    """A row of a demonstration."""
-
-    demonstration: str
-    row: int
-    """Its place in the demonstration, from 0."""
-    action: str
-    """What was done."""
-
-
-@dataclass(frozen=True, slots=True)
-class Witness:
-    """A state in which a rule is broken: of all of them, the nearest to what was shown."""
-
-    point: Point
-    command: nodes.Action | None
-    """What the tree commands there; None: nothing."""
-    row: ShownRow | None
-    """The row that is nearest; None where rows are not at hand."""
-    distance: float
-    """From what was shown: a sum over the features, in shares of all that was shown of each."""
-
-
-@dataclass(frozen=True, slots=True)
-class Coverage:
-    """How much of what a rule is about was shown."""
-
-    rows: int
-    """In the states that it is about."""
-    all_rows: int
-    breaking: int
-    """Rows in which the demonstrator did what the rule forbids, or left what it demands."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Verdict:
-    """What is known of one rule."""
-
-    demand: Demand
-    answer: Answer
-    witness: Witness | None = None
-    """Of a broken rule."""
-    region: Boxes | None = None
-    """Of a broken rule, all states in which it is broken; None if they are too many."""
-    why: str = ""
-    """Of a rule that is unknown: what it depends on."""
-    coverage: Coverage | None = None
-    """None where rows are not at hand."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ChannelProof:
-    """The rules about one channel."""
-
-    channel: str
-    grid: Grid
-    verdicts: tuple[Verdict, ...]
+from rebt_ros.verification.verdict import Answer, ChannelProof, Coverage, ShownRow, Verdict, Witness
 
 
 def check(
@@ -151,14 +81,6 @@ def policies_of(learned: LearnedTree) -> dict[str, nodes.Node]:
     return policies
 
 
-def verdicts(proofs: Sequence[ChannelProof], demands: Sequence[Demand]) -> tuple[Verdict, ...]:
-    """The verdicts of all channels, in the order of the rules."""
-    of: Mapping[int, Verdict] = {
-        id(verdict.demand): verdict for proof in proofs for verdict in proof.verdicts
-    }
-    return tuple(of[id(demand)] for demand in demands)
-
-
 def grid_of(
     learned: LearnedTree, trees: Iterable[nodes.Node | None], formulas: Iterable[Formula] = ()
 ) -> Grid:
@@ -187,7 +109,9 @@ class _ChannelCheck:
     def proof(self, demands: Sequence[Demand]) -> ChannelProof:
         grid = grid_of(self.learned, [self.tree], [one.region for one in demands])
         finder = StateFinder(grid, self.learned.features, self.shown)
-        commands = Commands(self.learned, self.channel, self.tree, self.results)
+        commands = _Commands(
+            self.learned, self.channel, self.tree, run=self.results is Results.REPORTED
+        )
         broken = self._broken(demands, grid, finder, commands)
         any_tick = (
             sweep(self.tree, grid, self.results, Ticks.ANY)
@@ -212,7 +136,7 @@ class _ChannelCheck:
         return ChannelProof(self.channel, grid, tuple(found))
 
     def _broken(
-        self, demands: Sequence[Demand], grid: Grid, finder: StateFinder, commands: Commands
+        self, demands: Sequence[Demand], grid: Grid, finder: StateFinder, commands: _Commands
     ) -> list[Broken]:
         """Where a first tick breaks each rule."""
         size = 0 if self.tree is None else nodes.size(self.tree)
@@ -225,7 +149,7 @@ class _ChannelCheck:
             if branches is None:
                 raise
             leaves = [node for node in nodes.walk(self.tree) if isinstance(node, nodes.Action)]
-            return searched(demands, branches, leaves, grid, finder, commands)
+            return searched(demands, branches, leaves, grid, finder, commands.of)
         return found_in([breaking(one, grid, first) for one in demands], finder)
 
     def _why_unknown(self, demand: Demand, grid: Grid, any_tick: Sweep, finder: StateFinder) -> str:
@@ -260,6 +184,64 @@ class _ChannelCheck:
         done = table.chosen == code
         breaking_rows = about & (done if demand.forbids is not None else ~done)
         return Coverage(int(about.sum()), len(table), int(breaking_rows.sum()))
+
+
+class _Commands:
+    """What a tree commands in a first tick, asked of other programs than the proof.
+
+    Args:
+        learned: The tree.
+        channel: The channel.
+        tree: That of the channel, as it is executed; None: none, which does nothing.
+        run: Whether actions go on after the tick, rather than succeed at once.
+    """
+
+    def __init__(
+        self, learned: LearnedTree, channel: str, tree: nodes.Node | None, *, run: bool
+    ) -> None:
+        self._learned = learned
+        self._channel = channel
+        self._tree = tree
+        self._run = run
+
+    def of(self, points: Sequence[Point]) -> list[nodes.Action | None]:
+        """The command in each of some states; None: nothing."""
+        if self._tree is None or not points:
+            return [None] * len(points)
+        if self._plan is None:
+            return [self._ticked(point) for point in points]
+        histories = [_history(point) for point in points]
+
+        def holds(condition: HistoryCondition) -> BoolArray:
+            return np.array([holds_after(history, condition) for history in histories], dtype=bool)
+
+        values = np.array([point.values for point in points]).reshape(len(points), -1)
+        actions = self._plan.actions
+        chosen = self._plan.choose(actions, States(self._learned.features, values, holds))
+        return [actions[code] if code >= 0 else None for code in chosen.tolist()]
+
+    @cached_property
+    def _plan(self) -> Plan | None:
+        """Evaluates many states together; None where that does not do what a tick does."""
+        assert self._tree is not None
+        repeats = any(isinstance(node, nodes.Repeater) for node in nodes.walk(self._tree))
+        if repeats or self._run:
+            return None
+        return Plan(self._tree, self._learned.features)
+
+    def _ticked(self, point: Point) -> nodes.Action | None:
+        runtime = TreeRuntime(
+            self._learned,
+            AlwaysRunning() if self._run else SucceedAtOnce(),
+            executable(self._learned.tree),
+            {self._channel: _history(point)},
+        )
+        commands = runtime.tick(point.values).commands
+        return next((command for command in commands if command.channel == self._channel), None)
+
+
+def _history(point: Point) -> ActionHistory:
+    return ActionHistory() if point.before is None else point.before.history()
 
 
 def breaking(demand: Demand, grid: Grid, done: Sweep) -> Boxes:

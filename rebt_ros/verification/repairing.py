@@ -18,20 +18,12 @@ from rebt_ros.logic.conditions import Literal
 from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.formulas import AllOf, AnyOf, Formula, negated
 from rebt_ros.verification.grid import Boxes, Grid
-from rebt_ros.verification.proof import (
-    Answer,
-    ChannelProof,
-    Verdict,
-    breaking,
-    check,
-    grid_of,
-    policies_of,
-    verdicts,
-)
+from rebt_ros.verification.proof import breaking, check, grid_of, policies_of
 from rebt_ros.verification.reference import Reference, of_table
 from rebt_ros.verification.rules import Demand
 from rebt_ros.verification.states import StateFinder
 from rebt_ros.verification.sweep import Results, Sweep, Ticks, remembers, sweep
+from rebt_ros.verification.verdict import Answer, ChannelProof, Verdict, verdicts
 from rebt_ros.verification.verdict_text import what_breaks
 
 #: How often rules are gone through: a guard may let another branch act.

@@ -9,10 +9,11 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.verification.contradictions import agreeing_demands
 from rebt_ros.verification.errors import BrokenRuleError
-from rebt_ros.verification.proof import Verdict, check, verdicts
+from rebt_ros.verification.proof import check
 from rebt_ros.verification.repairing import repair
 from rebt_ros.verification.rules import RuleSet
 from rebt_ros.verification.sweep import Results
+from rebt_ros.verification.verdict import Verdict, verdicts
 from rebt_ros.verification.verdict_text import what_breaks
 
 

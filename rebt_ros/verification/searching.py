@@ -7,20 +7,19 @@ breaks the rule, and then only what is nearer remains to be looked at.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.verification.branches import Branch, where_some_act
-from rebt_ros.verification.commanding import Commands
 from rebt_ros.verification.errors import TooManyPartsError
 from rebt_ros.verification.grid import Boxes, Grid
 from rebt_ros.verification.rules import Demand
-from rebt_ros.verification.states import Near, StateFinder, Unsettled
+from rebt_ros.verification.states import Near, Point, StateFinder, Unsettled
 
 #: Into how many parts the states may fall that are nearer to what was shown than a known one.
 _MOST_NEARER: Final = 20_000
@@ -29,6 +28,9 @@ _MOST_ASKED: Final = 50_000
 #: Beside how many rows it is tried whether a state breaks a rule, at a time and in all.
 _TRIED_AT_A_TIME: Final = 8
 _MOST_TRIED: Final = 64
+
+#: What a tree commands in each of some states.
+_Commands: TypeAlias = Callable[[Sequence[Point]], Sequence[nodes.Action | None]]
 
 _UNSETTLED: Final = "it depends on which combinations of features there are"
 _OVERLAPPING: Final = (
@@ -70,7 +72,7 @@ def searched(
     leaves: Sequence[nodes.Action],
     grid: Grid,
     finder: StateFinder,
-    commands: Commands,
+    commands: _Commands,
 ) -> list[Broken]:
     """Where the first tick of a list of branches breaks rules, without looking at all its parts.
 
@@ -115,12 +117,12 @@ class _Asked:
         return cls(demand, grid.boxes(demand.region), wanted)
 
 
-def _beside_rows(asked: _Asked, finder: StateFinder, commands: Commands) -> Near | None:
+def _beside_rows(asked: _Asked, finder: StateFinder, commands: _Commands) -> Near | None:
     """A state that breaks a rule, of those nearest to each row in the region of the rule."""
     forbidden = asked.demand.forbids is not None
     tried = 0
     for some in finder.beside(asked.boxes, _TRIED_AT_A_TIME):
-        of_each = commands.of([near.point for near in some])
+        of_each = commands([near.point for near in some])
         for near, command in zip(some, of_each, strict=True):
             if (command == asked.demand.action) is forbidden:
                 return near

@@ -352,6 +352,10 @@ class StateFinder:
         if field.feature is not None and field.feature.kind is FeatureKind.CATEGORICAL:
             codes = np.flatnonzero(cells)
             return float(field.ends[codes[0]])
+        if field.feature is not None and field.feature.kind is FeatureKind.BINARY:
+            for truth in sorted((0.0, 1.0), key=lambda one: abs(one - value)):
+                if cells[field.cell(truth)]:
+                    return truth
         best, least = math.nan, math.inf
         for one in _ranges(field, cells):
             if not one.missing:

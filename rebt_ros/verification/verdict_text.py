@@ -8,8 +8,8 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.wording import name_text
 from rebt_ros.verification.describing import BoxWords, action_text, point_text
 from rebt_ros.verification.grid import Boxes, Grid
-from rebt_ros.verification.proof import Answer, ChannelProof, Verdict
 from rebt_ros.verification.rules import RuleKind
+from rebt_ros.verification.verdict import Answer, ChannelProof, Verdict
 
 
 def what_breaks(

@@ -12,9 +12,10 @@ from rebt_ros.behavior_tree.prediction import States, choose, history_columns
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.learning.options import LearnOptions
 from rebt_ros.learning.pipeline import learn_from
-from rebt_ros.verification.proof import Answer, check, verdicts
+from rebt_ros.verification.proof import check
 from rebt_ros.verification.resolving import demands
 from rebt_ros.verification.rules_file import loads
+from rebt_ros.verification.verdict import Answer, verdicts
 
 _FEATURES = 24
 _RULES = 20

@@ -22,8 +22,8 @@ from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.storage.input_options import InputOptions
 from rebt_ros.verification import rules_file
 from rebt_ros.verification.errors import RuleError
-from rebt_ros.verification.proof import Answer
 from rebt_ros.verification.robot_rules import rules_of, together
+from rebt_ros.verification.verdict import Answer
 
 STATE = "state: {distance: /a.b}\nrules:\n"
 

@@ -22,10 +22,11 @@ from rebt_ros.logic.conditions import (
     Threshold,
 )
 from rebt_ros.verification import proof, searching
-from rebt_ros.verification.proof import Answer, Coverage, ShownRow, check, grid_of, verdicts
+from rebt_ros.verification.proof import check, grid_of
 from rebt_ros.verification.resolving import demands
 from rebt_ros.verification.rules_file import loads
 from rebt_ros.verification.sweep import Results, Ticks, remembers, sweep
+from rebt_ros.verification.verdict import Answer, Coverage, ShownRow, verdicts
 
 #: With REBT_ROS_RULES=N, N times as many pairs of trees and rules.
 MORE = int(os.environ.get("REBT_ROS_RULES", "1"))

@@ -11,11 +11,12 @@ from hypothesis import HealthCheck, assume, given, settings
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.runtime import executable
 from rebt_ros.verification.errors import RuleError
-from rebt_ros.verification.proof import Answer, check, verdicts
+from rebt_ros.verification.proof import check
 from rebt_ros.verification.repairing import Repaired, repair
 from rebt_ros.verification.resolving import demands
 from rebt_ros.verification.rules_file import loads
 from rebt_ros.verification.sweep import Results
+from rebt_ros.verification.verdict import Answer, verdicts
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
 NEAR, LOW = some.at_most("distance", 0.3), some.at_most("battery", 0.2)

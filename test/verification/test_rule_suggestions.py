@@ -12,10 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from rebt_ros.commands import suggest_rules as command
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.verification import suggesting_rules
-from rebt_ros.verification.proof import check, verdicts
+from rebt_ros.verification.proof import check
 from rebt_ros.verification.resolving import demands
 from rebt_ros.verification.rules_file import loads
 from rebt_ros.verification.suggesting_rules import suggested_rules
+from rebt_ros.verification.verdict import verdicts
 
 
 def rows(count: int) -> DemonstrationTable:

@@ -31,8 +31,9 @@ from rebt_ros.verification.contradictions import refuse_contradictions
 from rebt_ros.verification.errors import RuleError
 from rebt_ros.verification.formulas import AllOf, AnyOf, Formula
 from rebt_ros.verification.grammar import ConditionSyntaxError, parse
-from rebt_ros.verification.proof import Answer, check, verdicts
+from rebt_ros.verification.proof import check
 from rebt_ros.verification.resolving import demands
+from rebt_ros.verification.verdict import Answer, verdicts
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
 LEARNED = some.learned(GO)
