@@ -16,6 +16,8 @@ from rclpy.clock_type import ClockType
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
+from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
+
 #: How long a fault counts as recent, and stays quiet after it was logged (seconds).
 _RECENT = 5.0
 _QUIET = 10.0
@@ -59,7 +61,9 @@ class Diagnostics:
         self._source = node.get_fully_qualified_name().lstrip("/")
         self._task = task
         self._report = report
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = node.create_publisher(
+            DiagnosticArray, "/diagnostics", 10, event_callbacks=QUIET_PUBLISHER
+        )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(1.0, self.publish, callback_group=group, clock=steady)
 

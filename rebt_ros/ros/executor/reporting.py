@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from typing import Any, Final
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from std_msgs.msg import String
 
 from rebt_ros.behavior_tree import nodes
@@ -21,6 +23,7 @@ from rebt_ros.ros.executor.state_topics import StateTopics
 from rebt_ros.ros.executor.tree_intake import REFUSED, TreeIntake
 from rebt_ros.ros.executor.watching import Watching
 from rebt_ros.ros.graph_watch import Finding, GraphWatch
+from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
 
 #: Least time between two snapshots (seconds).
 _SNAPSHOT_PERIOD: Final = 0.2
@@ -69,7 +72,9 @@ class Reporting:
         self._watch = GraphWatch(node)
         self._last_snapshot = ""
         self._watchers = 0
-        self._snapshot = node.create_publisher(String, "~/snapshot", 10)
+        self._snapshot = node.create_publisher(
+            String, "~/snapshot", 10, event_callbacks=QUIET_PUBLISHER
+        )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(_SNAPSHOT_PERIOD, self._publish_snapshot, clock=steady)
         self._diagnostics = Diagnostics(node, "execution", self._report)
@@ -183,9 +188,16 @@ class Reporting:
                 *watch.timeless(),
                 *watch.unheard([*self._topics.subscriptions, *channels.results]),
                 *watch.mixed(self._topics.subscriptions),
-                *watch.unread(channels.publishers),
+                *watch.unread(self._publishers()),
             ]
         return watch.say(findings)
+
+    def _publishers(self) -> Iterable[Publisher]:
+        """What the robot is to hear: labels only where they are all that it is told."""
+        robot = self._settings.robot
+        if self._commands is not None and robot is not None and robot.commands:
+            return self._commands.publishers
+        return self._channels.publishers
 
     def _without_command(self) -> list[Finding]:
         """Labels of the tree for which the robot file has no command."""

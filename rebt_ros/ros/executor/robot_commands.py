@@ -8,6 +8,7 @@ from typing import Any, Final
 from py_trees.common import Status
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 from rebt_ros.errors import MessagePathError
 from rebt_ros.live.long_command import NOTHING, LongCommand, Running
@@ -23,6 +24,7 @@ from rebt_ros.robot_file.robot_file import (
 )
 from rebt_ros.ros.message_types import action_class, message_class, service_class
 from rebt_ros.ros.message_values import fill
+from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
 
 #: What action_msgs/msg/GoalStatus calls a goal that was reached.
 _SUCCEEDED: Final = 4
@@ -64,6 +66,11 @@ class RobotCommands:
         """The labels for which there is no command."""
         known = {*self._each_tick, *self._once, *self._long}
         return [label for label in labels if label not in known]
+
+    @property
+    def publishers(self) -> Iterable[Publisher]:
+        """What publishes messages."""
+        return self._publishers.values()
 
     @property
     def topics(self) -> frozenset[str]:
@@ -126,7 +133,9 @@ class RobotCommands:
         message = fill(kind(), self._place(label, "message", command.content))
         key = (command.topic, command.kind)
         if key not in self._publishers:
-            self._publishers[key] = self._node.create_publisher(kind, command.topic, _DEPTH)
+            self._publishers[key] = self._node.create_publisher(
+                kind, command.topic, _DEPTH, event_callbacks=QUIET_PUBLISHER
+            )
         publisher = self._publishers[key]
         stamped = hasattr(message, "header") and "header" not in command.content
 

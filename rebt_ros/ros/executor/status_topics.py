@@ -12,6 +12,7 @@ from std_msgs.msg import String
 from rebt_ros.errors import MessagePathError
 from rebt_ros.export.watched import NodeStatus, WatchedNode, WatchedTree
 from rebt_ros.ros.message_types import message_class
+from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
 
 XML_TOPIC: Final = "~/tree_xml"
 LOG_TOPIC: Final = "~/behavior_tree_log"
@@ -51,7 +52,9 @@ class StatusTopics:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._xml = node.create_publisher(String, XML_TOPIC, _LATCHED)
+        self._xml = node.create_publisher(
+            String, XML_TOPIC, _LATCHED, event_callbacks=QUIET_PUBLISHER
+        )
         self._tree: WatchedTree | None = None
         self._before: Mapping[int, str] = {}
         # Whether those who listen know the statuses of all nodes.
@@ -66,7 +69,9 @@ class StatusTopics:
                 f"their nodes: {err}"
             )
         else:
-            self._log = node.create_publisher(self._types.log, LOG_TOPIC, _LOG_DEPTH)
+            self._log = node.create_publisher(
+                self._types.log, LOG_TOPIC, _LOG_DEPTH, event_callbacks=QUIET_PUBLISHER
+            )
 
     @property
     def where(self) -> str:
