@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from builtin_interfaces.msg import Time
 from executor_examples import GO, READS_X, STOP, Robot, learned, report, where_x_is_small
+from geometry_msgs.msg import Twist
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_processes import LATCHED, NodeProcess, Peer, values_of
 from rosgraph_msgs.msg import Clock
@@ -272,6 +273,28 @@ def test_an_executor_says_that_nobody_obeys_it(domain: int, peer: Peer, tmp_path
         _warns(peer, "executor", "nobody listens to /command")
         peer.node.create_subscription(String, "command", lambda _: None, LATCHED)
         _warns(peer, "executor", "/test_peer requests incompatible QoS on /command")
+
+
+def test_an_executor_whose_labels_are_messages_says_that_nobody_hears_those(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    (tmp_path / "tree.json").write_text(dumps(READS_X))
+    labels = [action.label for action in READS_X.actions]
+    commands = "".join(
+        f"  {label}: {{publish: /cmd_vel, type: geometry_msgs/msg/Twist, message: {{}}}}\n"
+        for label in labels
+    )
+    (tmp_path / "robot.yaml").write_text(f"state: {{far: /scan.range_max}}\ncommands:\n{commands}")
+    parameters: dict[str, Any] = {
+        "tree_file": "tree.json",
+        "robot_file": "robot.yaml",
+        "enabled": True,
+    }
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        peer.connect(Float64MultiArray, "state")
+        _warns(peer, "executor", "nobody listens to /cmd_vel")
+        peer.node.create_subscription(Twist, "cmd_vel", lambda _: None, LATCHED)
+        _warns(peer, "executor", "/test_peer requests incompatible QoS on /cmd_vel")
 
 
 def test_an_executor_says_whom_it_cannot_hear(domain: int, peer: Peer, tmp_path: Path) -> None:
