@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
@@ -94,7 +95,7 @@ class SqliteFile:
         """
         if not self.is_damaged:
             try:
-                # SQLite sorts all of them before it gives the first.
+                # Damage is found before the first one is given.
                 yield from self._by_sqlite(numbers)
             except sqlite3.DatabaseError as err:
                 _refuse_interrupted(err)
@@ -166,19 +167,21 @@ class SqliteFile:
     def _by_sqlite(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         of_topics = f"FROM messages NOT INDEXED WHERE topic_id IN ({', '.join('?' * len(numbers))})"
         with contextlib.closing(_connected(self.path)) as connection:
-            stamps = connection.execute(
-                f"SELECT topic_id, timestamp {of_topics} ORDER BY id", tuple(numbers)
-            ).fetchall()
+            # With their data, so that damage is found before the first message is given.
+            rows = connection.execute(
+                f"SELECT topic_id, timestamp, data {of_topics} ORDER BY id", tuple(numbers)
+            )
+            stamps = [(number, stamp) for number, stamp, _ in rows]
             told = [one for one in stamps if isinstance(one[1], int)]
-            places = set(set_back(told)) if len(told) == len(stamps) else set()
+            all_told = len(told) == len(stamps)
+            places = set(set_back(told)) if all_told else set()
             self.set_back |= bool(places)
-            order = "id" if places else "timestamp, id"
+            sorted_already = all_told and all(one[1] <= other[1] for one, other in pairwise(told))
+            # To sort them takes SQLite as long as to read them several times.
+            order = "id" if places or sorted_already else "timestamp, id"
             messages: Iterable[tuple[int, int, bytes]] = connection.execute(
                 f"SELECT topic_id, timestamp, data {of_topics} ORDER BY {order}", tuple(numbers)
             )
-            if places:
-                # Without sorting, SQLite would find damage amid the messages.
-                messages = list(messages)
             for place, (number, stamp, data) in enumerate(messages):
                 if place in places:
                     yield GAP, stamp, b""
