@@ -6,7 +6,14 @@ import argparse
 from pathlib import Path
 
 from rebt_ros.commands.progress import ProgressBar
-from rebt_ros.commands.shell import add_input_options, aligned, input_options, parse, run
+from rebt_ros.commands.shell import (
+    add_input_options,
+    aligned,
+    input_options,
+    parse,
+    print_notes,
+    run,
+)
 from rebt_ros.inspection.idle import IDLE_SECONDS
 from rebt_ros.inspection.inspecting import inspect
 from rebt_ros.inspection.inspection import Inspection, dumps
@@ -45,7 +52,9 @@ def main(arguments: list[str] | None = None) -> None:
 def _inspect(parsed: argparse.Namespace) -> None:
     progress = ProgressBar()
     try:
-        loaded = load(tuple(parsed.inputs), input_options(parsed, progress))
+        # All notes are printed below.
+        reading = input_options(parsed, progress, tell_notes=lambda notes: None)
+        loaded = load(tuple(parsed.inputs), reading)
         inspection = inspect(
             loaded.demonstrations,
             tuple(map(str, loaded.paths)),
@@ -54,8 +63,7 @@ def _inspect(parsed: argparse.Namespace) -> None:
         )
     finally:
         progress.clear()
-    for note in (*loaded.notes, *inspection.notes):
-        print(f"note: {note}.")
+    print_notes((*loaded.notes, *inspection.notes))
     _print(inspection)
     for path, written in ((parsed.json, dumps), (parsed.html, inspection_page)):
         if path is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from enum import Enum
 from pathlib import Path
@@ -22,6 +22,7 @@ from rebt_ros.commands.shell import (
     directory,
     input_options,
     parse,
+    print_notes,
     run,
     use_color,
     word_of,
@@ -446,12 +447,20 @@ def _options(parsed: argparse.Namespace) -> LearnOptions:
 
 def _learn(parsed: argparse.Namespace) -> None:
     progress = ProgressBar()
+    told: list[str] = []
+
+    def tell(notes: tuple[str, ...]) -> None:
+        # At once: they may be the reason why nothing can be learned.
+        progress.clear()
+        told.extend(notes)
+        print_notes(notes)
+
     try:
         result = learning_from_files.learn(
             parsed.inputs,
             out=parsed.out,
             options=_options(parsed),
-            reading=_reading(parsed, progress),
+            reading=_reading(parsed, progress, tell),
             declared=_declared(parsed),
             levels=parsed.levels,
             most_levels=parsed.most_levels,
@@ -461,8 +470,7 @@ def _learn(parsed: argparse.Namespace) -> None:
         )
     finally:
         progress.clear()
-    for note in result.notes:
-        print(f"note: {note}.")
+    print_notes(note for note in result.notes if note not in told)
     print()
     # The suggestions are listed below, and drawn in the files.
     print(render_text(replace(result.learned, suggestions=()), color=use_color()))
@@ -492,8 +500,12 @@ def _learn(parsed: argparse.Namespace) -> None:
         print(f"Exported to {exported}.")
 
 
-def _reading(parsed: argparse.Namespace, progress: ProgressBar) -> InputOptions:
-    reading = input_options(parsed, progress)
+def _reading(
+    parsed: argparse.Namespace,
+    progress: ProgressBar,
+    tell_notes: Callable[[tuple[str, ...]], None],
+) -> InputOptions:
+    reading = input_options(parsed, progress, tell_notes)
     return (
         reading
         if parsed.weights is None

@@ -6,12 +6,21 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from rebt_ros.commands.shell import add_input_options, aligned, input_options, parse, run
+from rebt_ros.commands.shell import (
+    add_input_options,
+    aligned,
+    input_options,
+    parse,
+    print_notes,
+    run,
+)
 from rebt_ros.learning.replaying import Disagreement, Replay
 from rebt_ros.offline.replay_over_files import replay
 
 #: Recordings whose rows lie closer have no clock, as CSV tables (seconds).
 _NO_CLOCK = 1e-3
+#: So many actions are named that the tree does not have.
+_NAMED = 5
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -53,6 +62,8 @@ def _replay(parsed: argparse.Namespace) -> None:
 
 
 def _print(result: Replay, most: int) -> None:
+    if result.foreign:
+        print_notes([_on_foreign(result)])
     print(f"{result.rows} rows")
     print(f"  agreement, own history    {result.own_history_agreement:.2%}")
     print(f"  agreement, teacher-forced {result.teacher_forced_agreement:.2%}")
@@ -63,6 +74,17 @@ def _print(result: Replay, most: int) -> None:
         print()
         print(f"First {len(listed)} of {len(result.disagreements)} disagreements:")
         print("\n".join(_disagreement_table(listed)))
+
+
+def _on_foreign(result: Replay) -> str:
+    labels = [repr(label) for label in result.foreign]
+    named = ", ".join(labels[:_NAMED]) + (", …" if len(labels) > _NAMED else "")
+    are = "are no actions" if labels[1:] else "is no action"
+    rows = sum(result.foreign.values())
+    return (
+        f"{named} {are} of the tree, which cannot agree in {rows} of {result.rows} rows: it was "
+        "learned from others, or from the same by another name"
+    )
 
 
 def _confusion_table(result: Replay) -> Iterator[str]:

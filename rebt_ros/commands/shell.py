@@ -6,10 +6,10 @@ import argparse
 import contextlib
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import Enum
 from pathlib import Path
-from typing import TypeVar
+from typing import TextIO, TypeVar
 
 from rebt_ros import streams
 from rebt_ros.commands.progress import ProgressBar
@@ -279,9 +279,17 @@ def _robot_file(path: Path) -> RobotFile:
 
 
 def input_options(
-    arguments: argparse.Namespace, progress: ProgressBar | None = None
+    arguments: argparse.Namespace,
+    progress: ProgressBar | None = None,
+    tell_notes: Callable[[tuple[str, ...]], None] | None = None,
 ) -> InputOptions:
-    """The options that `add_input_options` added; the bar shows how far the reading is."""
+    """The options that `add_input_options` added.
+
+    Args:
+        arguments: What the command line says.
+        progress: Shows how far the reading is.
+        tell_notes: Told how the inputs were read; by default the terminal lists it.
+    """
     return InputOptions(
         labels=tuple(arguments.label),
         header=not arguments.no_header,
@@ -300,8 +308,22 @@ def input_options(
             progress=progress or ProgressBar(),
             tell=_tell,
             tell_counts=_tell_counts,
+            tell_notes=tell_notes or _list_notes,
         ),
     )
+
+
+def print_notes(notes: Iterable[str], to: TextIO | None = None) -> None:
+    """Prints notes, a line each; by default to the standard output."""
+    for note in notes:
+        print(f"note: {note}.", file=to)
+
+
+def _list_notes(notes: tuple[str, ...]) -> None:
+    """Says how the inputs were read, beside what a command prints."""
+    print_notes(notes[:_LISTED], sys.stderr)
+    if len(notes) > _LISTED:
+        print(f"and {len(notes) - _LISTED} more notes: learn prints all of them", file=sys.stderr)
 
 
 def _tell(aside: tuple[Aside, ...]) -> None:

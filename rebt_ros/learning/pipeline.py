@@ -195,8 +195,10 @@ def learn_from(
     table = shifted(table, late.rows)
     if len(np.unique(table.chosen)) < 2:
         shown = table.actions[table.chosen[0]]
+        rows = f"{len(table)} rows" if len(table) > 1 else "only row"
+        show = "show" if len(table) > 1 else "shows"
         raise InputError(
-            f"the {len(table)} rows of channel {table.channel!r} show one action only ({shown!r}): "
+            f"the {rows} of channel {table.channel!r} {show} one action only ({shown!r}): "
             "demonstrate at least two, as there is nothing to decide between."
         )
     # Before any rows are set apart, so that each still knows those before it.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,6 +48,8 @@ class Replay:
     """Rows by what was shown and what was chosen with own history, shape (actions, actions + 1);
     the last column counts rows in which no action was chosen."""
     disagreements: tuple[Disagreement, ...]
+    foreign: Mapping[str, int]
+    """Labels that were shown and that are no actions of the tree, and in how many rows."""
 
 
 def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tuple[Replay, ...]:
@@ -69,7 +71,8 @@ def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tup
     """
     policies = nodes.policies(learned.tree)
     return tuple(
-        _replay(policies[table.channel], table) for table in rows_for(learned, demonstrations)
+        _replay(learned, policies[table.channel], table)
+        for table in rows_for(learned, demonstrations)
     )
 
 
@@ -132,7 +135,7 @@ def _late(learned: LearnedTree, table: DemonstrationTable) -> int:
     return rows_in(table, seconds) if seconds is not None and tells_time(table) else rows
 
 
-def _replay(policy: nodes.Node, table: DemonstrationTable) -> Replay:
+def _replay(learned: LearnedTree, policy: nodes.Node, table: DemonstrationTable) -> Replay:
     own = evaluation.own_history_choices(policy, table)
     forced = evaluation.teacher_forced_choices(policy, table)
     confusion = np.zeros((len(table.actions), len(table.actions) + 1), dtype=np.int64)
@@ -146,7 +149,19 @@ def _replay(policy: nodes.Node, table: DemonstrationTable) -> Replay:
         table.actions,
         confusion,
         _disagreements(table, own),
+        _foreign(learned, table),
     )
+
+
+def _foreign(learned: LearnedTree, table: DemonstrationTable) -> dict[str, int]:
+    """Labels that were shown and that the tree does not know, and in how many rows."""
+    known = {action.label for action in learned.actions if action.channel == table.channel}
+    rows = np.bincount(table.chosen, minlength=len(table.actions)).tolist()
+    return {
+        label: count
+        for label, count in zip(table.actions, rows, strict=True)
+        if count and label not in known
+    }
 
 
 def _disagreements(table: DemonstrationTable, chosen: IntArray) -> tuple[Disagreement, ...]:

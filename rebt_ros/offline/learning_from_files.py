@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, unmeasurable
+from rebt_ros.demonstration.apart import apart
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.repeated import repeated
 from rebt_ros.demonstration.schema import FeatureKind
@@ -102,7 +103,7 @@ def learn(
     paths = as_paths(inputs)
     loaded = load(paths, replace(reading, features=reading.features | frozenset(declared)))
     files = {one.name: path for one, path in zip(loaded.demonstrations, loaded.paths, strict=True)}
-    again = tuple(repeated(loaded.demonstrations))
+    again = (*repeated(loaded.demonstrations), *apart(loaded.demonstrations))
     tables = tuple(
         replace(table, robot=loaded.robot)
         for table in tabulate(loaded.demonstrations, declared, loaded.weights)

@@ -6,6 +6,7 @@ receives, so that the same messages give the same rows.
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -35,6 +36,14 @@ ACTION_TYPE = "std_msgs/msg/String"
 
 #: So many messages can have been recorded at the same time.
 _FEW: Final = 4
+
+#: A state this old (nanoseconds), and so many times as old as is usual on its topic, is one that a
+#: sensor left behind which has fallen silent.
+_OLD: Final = 1_000_000_000
+_SILENT: Final = 10.0
+
+#: Topics of texts that describe a robot, which is no action.
+_DESCRIPTIONS: Final = frozenset({"robot_description", "robot_description_semantic"})
 
 #: So many different messages of so many bytes are remembered.
 _MOST_LABELS: Final = 1000
@@ -124,6 +133,10 @@ class Feed:
     """Stamp of another one."""
     bad: list[str] = field(default_factory=list)
     """What was wrong with the messages that were left out."""
+    last: dict[str, int] = field(default_factory=dict)
+    """Stamp of the last message by state topic."""
+    ages: dict[str, array[int]] = field(default_factory=dict)
+    """How old states were in rows, by state topic; of those that may be too old (nanoseconds)."""
 
     def demonstration(
         self,
@@ -189,12 +202,18 @@ class Feed:
             self.stale += 1
             return ()
         try:
-            return self.pushed(topic, stamp, data)
+            rows = self.pushed(topic, stamp, data)
+            if rows:
+                self.compare(rows)
+            if name in self.there:
+                self.last[name] = stamp
+            return rows
         except BadMessageError as err:
             if err.fault is Fault.NO_STATE:
                 self.early += 1
                 return ()
-            problem = InputError(f"{self.path}, message {self.seen[name]} on {name!r}: {err}")
+            text = str(err).rstrip(".") + ("" if self.skip_bad else "; --skip-bad leaves it out")
+            problem = InputError(f"{self.path}, message {self.seen[name]} on {name!r}: {text}.")
             problem.__cause__ = err
         except UndecodableError as err:
             problem = InputError(
@@ -233,6 +252,13 @@ class Feed:
         values, labels = self.states.read(data)
         return self.builder.observe(stamp, name, values, labels)
 
+    def compare(self, rows: Sequence[Row]) -> None:
+        """Remembers how old the states of rows are."""
+        for row in rows:
+            for name, stamp in self.last.items():
+                if row.stamp - stamp > _OLD:
+                    self.ages.setdefault(name, array("q")).append(row.stamp - stamp)
+
     def account(self, stated: int, demonstration: Demonstration) -> Account:
         """Where the messages went, of which the bag states so many."""
         left_out = {
@@ -263,12 +289,25 @@ class Feed:
                 f"left out: {_counted(self.stale, 'action')} after messages that are missing, "
                 "whose state is not known"
             )
+        notes += self._on_silence()
         if self.bad:
             notes.append(
                 f"left out: {_counted(len(self.bad), 'unusable message')}; "
                 f"the first: {self.bad[0].rstrip('.')}"
             )
         return tuple(notes)
+
+    def _on_silence(self) -> Iterator[str]:
+        """Notes on states that had grown old, where they come often as a rule."""
+        for name, ages in sorted(self.ages.items()):
+            usual = (self.latest - self.earliest) / self.seen[name]
+            old = [age for age in ages if age > _SILENT * usual]
+            if old:
+                yield (
+                    f"{_counted(len(old), 'row')} have a state that is up to {max(old) / 1e9:.3g} "
+                    f"seconds old, as nothing came on {name!r} for so long, where a message comes "
+                    f"every {usual / 1e9:.2g} seconds: see whether its sensor or driver failed"
+                )
 
     def _has_no_times(self) -> bool:
         return self.earliest == self.latest and self.seen.total() > _FEW
@@ -491,18 +530,23 @@ def _chosen(
     taken: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """The topics to read, as the bag has them; unless named, none that is taken."""
-    candidates = [topic for topic, its in kinds.items() if kind in its and topic not in taken]
+    candidates = [
+        topic
+        for topic, its in kinds.items()
+        if kind in its and topic not in taken and topic.rpartition("/")[2] not in _DESCRIPTIONS
+    ]
     if not names and len(candidates) == 1:
         return (candidates[0],)
     if not names and candidates:
         raise InputError(
             f"{path} has {len(candidates)} topics of type {kind} ({', '.join(candidates)}): "
-            f"say which of them is the {role} topic."
+            f"say which of them is the {role} topic (--{role}-topic)."
         )
     there = listed(kinds)
     if not names:
         raise InputError(
-            f"{path} has no {role} topic: record one of type {kind}; there is {there}."
+            f"{path} has no {role} topic of type {kind}: record one, or say by a robot file "
+            f"(--robot), for which describe makes a beginning, what to take of {there}."
         )
     topics = []
     for name in names:

@@ -87,9 +87,9 @@ _TIME = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?"
 _ZONE = r" ?(?:Z|UTC|GMT|[+-]\d{2}:?\d{2})"
 _MOMENT = re.compile(rf"(?:{_DATE})(?:,?[T ]{_TIME}(?:{_ZONE})?)?|{_TIME}")
 
-#: Of cells most of which are numbers, this share must be; and so many different ones, as otherwise
-#: they are codes.
-_MOSTLY, _MANY_NUMBERS = 0.9, 20
+#: Of cells most of which are numbers, this share must be, or all but so few different words; and so
+#: many different ones, as otherwise they are codes.
+_MOSTLY, _FEW_WORDS, _MANY_NUMBERS = 0.9, 3, 20
 #: Texts may all differ in so few rows; in more, half of them must recur.
 _FEW_TEXTS, _RECURRING = 20, 0.5
 #: Nor more texts than that: each is an indicator of as many cells as there are rows.
@@ -274,8 +274,12 @@ def _stand_ins(values: FloatArray) -> Iterable[tuple[float, int]]:
             continue
         if len(np.unique(others)) < _FEWEST_OTHERS:
             continue
-        distance = np.abs(others - number).min()
-        if distance > _FAR * max(np.ptp(others), np.abs(others).max()):
+        with np.errstate(
+            over="ignore"
+        ):  # What is as large as that is refused later, in a sentence.
+            distance = np.abs(others - number).min()
+            spread = _FAR * max(np.ptp(others), np.abs(others).max())
+        if distance > spread:
             yield float(number), len(kept) - len(others)
 
 
@@ -291,7 +295,7 @@ def _is_stand_in(number: float) -> bool:
 
 def _rounded(name: str, cells: Sequence[str], values: FloatArray) -> Iterable[str]:
     """A note where integers are too long to be told apart."""
-    for place in np.flatnonzero(np.abs(values) > _LARGEST_EXACT).tolist():
+    for place in np.flatnonzero(np.abs(values) >= _LARGEST_EXACT).tolist():
         cell = cells[place].strip()
         digits = cell.lstrip("+-").lstrip("0")
         # Python reads no integer of thousands of digits, and no such number is learned from.
@@ -378,12 +382,13 @@ def _plain(cells: Iterable[str]) -> Iterable[str]:
 
 
 def _mostly_numbers(name: str, cells: Sequence[str], line: Callable[[int], int]) -> Column | None:
-    """Numbers with a few words among them, which are missing values."""
+    """Numbers with a few words among them, however often each stands there: missing values."""
     filled = [cell for cell in cells if cell]
     found = list(_plain(filled))
-    if len(found) < _MOSTLY * len(filled) or len(set(found)) <= _MANY_NUMBERS:
-        return None
     words = [place for place, cell in enumerate(cells) if cell and not is_number(cell)]
+    few = len({cells[place] for place in words}) <= _FEW_WORDS
+    if not (few or len(found) >= _MOSTLY * len(filled)) or len(set(found)) <= _MANY_NUMBERS:
+        return None
     values = numbers([cell if is_number(cell) else "" for cell in cells])
     assert values is not None
     count = f"{len(words)} cells hold" if len(words) > 1 else "1 cell holds"

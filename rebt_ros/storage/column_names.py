@@ -9,9 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
+from rebt_ros.arrays import FloatArray
 from rebt_ros.storage.cells import is_missing, is_number, is_value_like, numbers
 from rebt_ros.storage.records import Records
 
@@ -33,6 +35,12 @@ _SECONDS = frozenset({"sec", "secs"})
 #: What a name may say behind what it is: a unit of time.
 _UNIT_OF_TIME = re.compile(
     r"[ _]*[\[(]?(?:s|secs?|seconds?|m?secs?|[mun]s|n(?:ano)?secs?|utc|unix|epoch)[\])]?\Z"
+)
+#: Columns of these names say to which demonstration a row belongs where no value comes back.
+_DEMONSTRATION = re.compile(
+    r"(?:(?:episode|trial|demo|demonstration|traj|trajectory|rollout)s?"
+    r"|(?:run|session|bag)(?=[ _.]?(?:id|idx|index|no|nr|num|number|name)\Z))"
+    r"(?:[ _.]?(?:id|idx|index|no|nr|num|number|name))?"
 )
 
 _LINE_BREAKS = re.compile(r"\s*[\r\n]\s*")
@@ -91,10 +99,9 @@ def numbers_rows(name: str, cells: Sequence[str]) -> bool:
     values = numbers([cell.strip() for cell in cells])
     if values is None or len(values) < FEWEST_RISING:
         return False
-    rises = np.diff(values)
     if counts:
-        return bool(np.all(rises > 0))
-    if not np.all(rises >= 0):
+        return bool(np.all(values[1:] > values[:-1]))
+    if not _never_falls(values):
         return False
     return plain in _SECONDS or 2 * len(np.unique(values)) > len(values)
 
@@ -106,12 +113,28 @@ def tells_time(cells: Sequence[str]) -> bool:
     them, and never fall.
     """
     values = numbers([cell.strip() for cell in cells])
-    if values is None or len(values) < FEWEST_RISING or not np.all(np.diff(values) >= 0):
+    if values is None or len(values) < FEWEST_RISING or not _never_falls(values):
         return False
     begin, end = values[0], values[-1]
     return begin < end and any(
         1e9 * unit <= begin and end < 4e9 * unit for unit in (1.0, 1e3, 1e6, 1e9)
     )
+
+
+def _never_falls(values: FloatArray) -> bool:
+    return bool(np.all(values[1:] >= values[:-1]))
+
+
+def tells_demonstrations(name: str, cells: Sequence[str]) -> bool:
+    """Whether a column says to which demonstration each row belongs.
+
+    By its name, and as none of its values comes back once another one has begun; a table of one
+    demonstration has one of them.
+    """
+    if not _DEMONSTRATION.fullmatch(name.strip().lower()):
+        return False
+    stretches = [cell for cell, _ in groupby(one.strip() for one in cells)]
+    return len(set(stretches)) == len(stretches) and all(stretches)
 
 
 def of_the_actions(names: Sequence[str]) -> int | None:

@@ -41,6 +41,7 @@ from rebt_ros.storage.column_names import (
     label_position,
     numbers_rows,
     of_the_actions,
+    tells_demonstrations,
     tells_time,
 )
 from rebt_ros.storage.read import Read
@@ -106,6 +107,7 @@ def read_csv(
         row_kind = RowKind.EVENT if outcomes else RowKind.SAMPLE
     known = outcomes if stamps is None else outcomes | {STAMP}
     left_out = _numbering(shown, known, features, notes)
+    left_out |= _episodes(shown, known | left_out, features, notes)
     read, columns, unreadable = _states(shown, known | left_out, notes)
     taken, label = shown.events()
     actions, chosen = shown.actions(taken, label)
@@ -240,6 +242,28 @@ def _numbering(
             else ""
         )
         notes.append(f"column {name!r} numbers or dates the rows and is no feature{integers}")
+    return frozenset(found)
+
+
+def _episodes(
+    shown: _Shown, known: Set[str], asked_for: Set[str], notes: list[str]
+) -> frozenset[str]:
+    """The columns that say to which demonstration a row belongs."""
+    table = shown.table
+    found = set()
+    for place, name in enumerate(table.columns):
+        if place in table.labels or name in known or name in asked_for:
+            continue
+        if not tells_demonstrations(name, shown.cells[place]):
+            continue
+        found.add(name)
+        note = f"column {name!r} says to which demonstration a row belongs and is no feature"
+        if (count := len({cell.strip() for cell in shown.cells[place]})) > 1:
+            note += (
+                f"; its {count} are learned from as a single one, in which each seems to go on "
+                "where the one before has ended: write each to a table of its own"
+            )
+        notes.append(note)
     return frozenset(found)
 
 
@@ -446,6 +470,12 @@ def _labelled(table: _Table, notes: list[str]) -> list[int]:
             )
         if not empty:
             continue
+        signs = {cells[label].strip() for cells in table.rows if _is_no_action(cells[label])}
+        notes += [
+            f"{sign!r} is taken for no action: write it out if it is one"
+            for sign in sorted(signs)
+            if sign and not any(map(str.isalnum, sign)) and not is_failed(sign)
+        ]
         if len(table.labels) == 1:
             notes.append(f"{empty} of {count} rows have no action and are left out")
         else:

@@ -62,6 +62,10 @@ def _tell_nobody(aside: tuple[Aside, ...]) -> None:
     pass
 
 
+def _note_nothing(notes: tuple[str, ...]) -> None:
+    pass
+
+
 def _count_nothing(counts: ReadCounts) -> None:
     pass
 
@@ -85,6 +89,9 @@ class ReadingPlan:
     """Told what was set aside, where something was."""
     tell_counts: Callable[[ReadCounts], None] = _count_nothing
     """Told where what the inputs hold came from, once all is there."""
+    tell_notes: Callable[[tuple[str, ...]], None] = _note_nothing
+    """Told what a person should know about how the inputs were read, where there is something, each
+    led by the name of its demonstration; no full stops."""
 
 
 @dataclass(frozen=True, slots=True)

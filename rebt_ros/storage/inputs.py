@@ -113,18 +113,21 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         options.plan.tell(aside)
     options.plan.tell_counts(ReadCounts(gathered.cached, len(there) - gathered.cached, len(aside)))
     reads = _with_common_features([read for _, read in there])
+    notes = (
+        *_notes_on_excluded(left_out, len(every)),
+        *_notes_on_cache(gathered, options),
+        *passed_over(inputs, {one.path for one in every}),
+        *(
+            f"{read.demonstration.name}: {note}"
+            for read in reads
+            for note in (*read.notes, *(read.account.notes() if read.account else ()))
+        ),
+    )
+    if notes:
+        options.plan.tell_notes(notes)
     return Loaded(
         tuple(read.demonstration for read in reads),
-        (
-            *_notes_on_excluded(left_out, len(every)),
-            *_notes_on_cache(gathered, options),
-            *passed_over(inputs, {one.path for one in every}),
-            *(
-                f"{read.demonstration.name}: {note}"
-                for read in reads
-                for note in (*read.notes, *(read.account.notes() if read.account else ()))
-            ),
-        ),
+        notes,
         {read.demonstration.name: read.account for read in reads if read.account},
         next((read.robot for read in reads if read.robot is not None), None),
         aside,

@@ -114,7 +114,11 @@ def read_records(path: Path) -> Records:
     kept = [place for place, reason in zip(filled, reasons, strict=True) if reason is None]
     left_out = Counter(reason for reason in reasons if reason is not None)
     left_out[NoRow.EMPTY] += sum(map(bool, rows)) - len(filled)
-    rows = _without_blank_ends([rows[place] for place in kept])
+    rows = [rows[place] for place in kept]
+    if dialect.delimiter == "|" and not any(cells[0].strip() for cells in rows):
+        # In Markdown, lines also begin with what separates cells.
+        rows = [cells[1:] for cells in rows]
+    rows = _without_blank_ends(rows)
     notes = (*encoding, *dialect.notes)
     if cut := _cut_off(text, rows):
         notes += (cut,)

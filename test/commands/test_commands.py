@@ -148,6 +148,52 @@ def test_replay_shows_agreement_confusion_and_disagreements(learned: Path, table
     assert first.split()[1:] == ["8", "go", "turn"]
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("learn", "--out", "OUT"),
+        ("replay", "TREE"),
+        ("inspect",),
+        ("suggest-rules",),
+        ("check", "TREE"),
+        ("explain", "TREE", "--row", "0"),
+    ],
+)
+def test_every_command_tells_how_it_read_what_it_was_given(
+    learned: Path, tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    odd = tmp_path / "odd.csv"
+    lines = TABLE.splitlines()
+    odd.write_text("\n".join([*lines, "0.3,1,", "0.3,1,"]) + "\n")
+    words = {"TREE": str(learned / "tree.json"), "OUT": str(tmp_path / "out")}
+    name, *given = (words.get(one, one) for one in command)
+    done = run(name.replace("-", "_"), *given, odd)
+    assert done.returncode == 0, done.stderr
+    said = (done.stdout + done.stderr).splitlines()
+    assert said.count("note: odd.csv: 2 of 82 rows have no action and are left out.") == 1
+
+
+def test_replay_names_actions_that_the_tree_does_not_have(learned: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.csv"
+    other.write_text(TABLE.replace(",go", ",GO").replace(",turn", ",1"))
+    done = run("replay", learned / "tree.json", other)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("note: '1', 'GO' are no actions of the tree, which cannot agree")
+    assert "in 40 of 80 rows" in done.stdout.splitlines()[0]
+
+
+def test_how_the_inputs_were_read_is_told_where_nothing_can_be_learned(tmp_path: Path) -> None:
+    signs = tmp_path / "signs.csv"
+    signs.write_text("x,action\n" + "".join(f"{x},{'+-'[x % 2]}\n" for x in range(20)))
+    done = run("learn", signs, "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert "one action only ('+')" in done.stderr
+    assert done.stdout.splitlines() == [
+        "note: signs.csv: '-' is taken for no action: write it out if it is one.",
+        "note: signs.csv: 10 of 20 rows have no action and are left out.",
+    ]
+
+
 def test_replay_refuses_a_recording_without_the_features_of_the_tree(
     learned: Path, tmp_path: Path
 ) -> None:

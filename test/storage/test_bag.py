@@ -181,8 +181,8 @@ def test_topics_without_messages_do_not_make_the_choice_harder(tmp_path):
             r"2 topics of type .*MultiArray \(/other, /state\): say which",
         ),
         ([*MESSAGES, Message(6, "/command", "x")], {}, r"\(/action, /command\): say which"),
-        (MESSAGES[1:2], {}, "has no state topic: .*; there is /action"),
-        (MESSAGES[:1], {}, "has no action topic: .*; there is /state"),
+        (MESSAGES[1:2], {}, "has no state topic of type .*--robot.*, what to take of /action"),
+        (MESSAGES[:1], {}, "has no action topic of type .*--robot.*, what to take of /state"),
         (MESSAGES, {"state_topics": [StateTopic("/odom")]}, "no messages on state topic '/odom'"),
         (MESSAGES, {"action_topics": ["cmd"]}, "no messages on action topic 'cmd': there is /act"),
         (MESSAGES, {"action_topics": ["/state"]}, "'/state' must be of type std_msgs/msg/String"),
@@ -214,6 +214,53 @@ def test_actions_before_the_first_state_are_left_out_with_a_note(tmp_path):
     assert read.notes == ("left out: 1 action before the first message of every state topic",)
 
 
+@pytest.mark.parametrize(
+    "name", ["/robot_description", "/r1/robot_description", "/a/robot_description_semantic"]
+)
+def test_what_describes_a_robot_is_no_action(tmp_path: Path, name: str) -> None:
+    path = write_bag(tmp_path / "run", [Message(0, name, "<robot/>"), *MESSAGES])
+    assert rows_of(read_bag(path).demonstration)[0] == (2, "go", (0.1, 1.0))
+    asked = read_bag(path, action_topics=["/action", name])
+    assert asked.demonstration.channels == ("/action",)
+
+
+@pytest.mark.parametrize("rate", [None, 5.0])
+@pytest.mark.parametrize(
+    ("period", "silence", "noted"),
+    [
+        (0.05, (3.0, 6.0), True),  # a sensor drops out,
+        (0.05, (7.0, 10.0), True),  # or dies before the end
+        (0.05, (3.0, 3.9), False),  # within the time that a robot may take to think
+        (0.4, (3.0, 6.0), False),  # what comes now and then may stay away for longer
+        (20.0, (3.0, 6.0), False),  # said once, for those who come late
+    ],
+)
+def test_rows_with_a_state_that_had_grown_old_are_noted(
+    tmp_path: Path, period: float, silence: tuple[float, float], noted: bool, rate: float | None
+) -> None:
+    begin, end = (int(one * SECOND) for one in silence)
+    times = [int(place * period * SECOND) for place in range(1 + int(10 / period))]
+    states = [Message(one, "/state", (one / SECOND,)) for one in times if not begin < one < end]
+    actions = [
+        Message(1 + one * SECOND // 5, "/action", "go" if one % 3 else "turn") for one in range(50)
+    ]
+    other = [Message(one, "/other", (1.0,)) for one in range(0, 10 * SECOND, SECOND // 10)]
+    read = read_bag(
+        write_bag(tmp_path / "run", [*states, *actions, *other]),
+        state_topics=[StateTopic("/state"), StateTopic("/other")],
+        sample_rate=rate,
+    )
+    notes = [note for note in read.notes if "seconds old" in note]
+    assert bool(notes) == noted
+    if noted:
+        [note] = notes
+        ages = read.demonstration.stamps - read.demonstration.states[:, 0] * SECOND
+        assert note.startswith(f"{int((ages > SECOND).sum())} rows have a state")
+        assert "'/state'" in note
+        assert read.account is not None
+        assert read.account.rows == len(read.demonstration)
+
+
 BAD = {
     "NaN": (Message(4, "/state", (float("nan"), 1.0)), "nan at index 0"),
     "inf": (Message(4, "/state", (0.0, float("inf"))), "inf at index 1"),
@@ -227,7 +274,7 @@ BAD = {
 def test_a_bad_message_is_refused_with_its_number_and_topic(tmp_path, bad):
     message, reason = BAD[bad]
     path = write_bag(tmp_path / "run", [*MESSAGES[:3], message, *MESSAGES[3:]])
-    with pytest.raises(InputError, match=f"message 3 on '/state'.*{reason}"):
+    with pytest.raises(InputError, match=f"message 3 on '/state'.*{reason}.*--skip-bad"):
         read_bag(path)
 
 

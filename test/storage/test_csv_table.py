@@ -104,7 +104,7 @@ def test_what_says_that_there_is_no_value_is_a_missing_value(table, cell):
     )
     assert np.isnan(read.demonstration.states[1]).all()
     assert labels(read.demonstration) == ["go", "turn"]
-    assert read.notes == ("1 of 3 rows have no action and are left out",)
+    assert read.notes[-1] == "1 of 3 rows have no action and are left out"
     assert read.account == Account("rows", 3, 2, 2, {"have no action": 1})
 
 

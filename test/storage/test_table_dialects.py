@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -200,7 +201,7 @@ DIALECTS: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
     ),
     "a table of Markdown": (
         "\n".join(f"| {' | '.join(row)} |" for row in [NAMES, [":--:"] * 5, *_plain()]),
-        ("separated by bars", "1 line is a ruled line", "blanks around actions", "'Unnamed: 0'"),
+        ("separated by bars", "1 line is a ruled line", "blanks around actions"),
     ),
     "files one behind the other": (
         f"\ufeff{_written(_plain()[:30])}\ufeff{_written(_plain()[30:])}",
@@ -502,6 +503,73 @@ def test_columns_that_rise_number_the_rows_if_their_names_say_so(
     assert features("dist", rising) == ["dist", "x"]
 
 
+@pytest.mark.parametrize("cells", ["0,0,1,1,2", "run_b,run_b,run_a,run_c,run_c", "7,7,7,7,7"])
+@pytest.mark.parametrize(
+    "name", ["episode", "Trial", "demo_id", "run id", "traj.index", "bag_name"]
+)
+def test_what_says_to_which_demonstration_a_row_belongs_is_no_feature(
+    name: str, cells: str, tmp_path: Path
+) -> None:
+    rows = [[cell, str(x), "go"] for x, cell in enumerate(cells.split(","))]
+    read = _read(tmp_path, _written(rows, [name, "x", "a"]))
+    assert [feature.name for feature in read.demonstration.features] == ["x"]
+    [note] = read.notes
+    assert "says to which demonstration a row belongs and is no feature" in note
+    assert ("write each to a table of its own" in note) == (cells != "7,7,7,7,7")
+
+
+@pytest.mark.parametrize(
+    ("name", "cells"),
+    [
+        ("episode", "0,1,0,1,1"),
+        ("run", "0,0,1,1,1"),
+        ("session", "1,1,2,2,2"),
+        ("trial_length", "1,1,2,2,2"),
+        ("bagged", "0,0,1,1,1"),
+        ("demo", ",1,1,1,2"),
+    ],
+)
+def test_what_comes_back_or_is_called_otherwise_is_a_feature(
+    name: str, cells: str, tmp_path: Path
+) -> None:
+    rows = [[cell, str(x), "go"] for x, cell in enumerate(cells.split(","))]
+    read = _read(tmp_path, _written(rows, [name, "x", "a"]))
+    assert [feature.name for feature in read.demonstration.features] == [name, "x"]
+
+
+@pytest.mark.parametrize("sign", ["-", "--", "?"])
+def test_a_sign_in_place_of_an_action_is_named(sign: str, tmp_path: Path) -> None:
+    read = _read(tmp_path, f"x,a\n1,go\n2,{sign}\n3,turn\n")
+    assert read.notes[0] == f"{sign!r} is taken for no action: write it out if it is one"
+    assert read.account is not None
+    assert read.account.left_out == {"have no action": 1}
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+@pytest.mark.parametrize("words", [("ERR",), ("no target", "out of range"), ("OL", "uncal", "off")])
+def test_a_few_words_among_numbers_are_missing_values_however_often_they_stand_there(
+    words: tuple[str, ...], share: float, tmp_path: Path
+) -> None:
+    count = int(30 / (1 - share))
+    rows = [
+        [words[x % len(words)] if x < share * count else f"{x}.5", "go" if x % 3 else "turn"]
+        for x in range(count)
+    ]
+    read = _read(tmp_path, _written(rows, ["x", "a"]))
+    assert read.demonstration.features[0].kind is FeatureKind.NUMERIC
+    missing = sum(row[0] in words for row in rows)
+    assert np.isnan(read.demonstration.states[:, 0]).sum() == missing
+    assert f"{missing} cells hold no number" in read.notes[0]
+
+
+def test_the_largest_numbers_are_compared_without_a_warning(tmp_path: Path) -> None:
+    rows = [["1e308" if x % 2 else "-1e308", str(x), "go"] for x in range(6)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(InputError, match="must lie within"):
+            _read(tmp_path, _written(rows, ["d", "x", "a"]))
+
+
 @pytest.mark.parametrize("name", ["row", "n", "id", "step", "goal_index"])
 def test_what_stays_from_a_row_to_the_next_does_not_count_rows(name: str, tmp_path: Path) -> None:
     read = _read(tmp_path, f"{name},x,a\n1,5,go\n2,6,go\n2,7,turn\n3,8,go\n4,8,go\n")
@@ -610,6 +678,11 @@ def test_integers_that_are_rounded_are_noted(tmp_path: Path) -> None:
     read = _read(tmp_path, f"x,y,a\n{2**60 + 1},{2**60},go\n3,4,turn\n")
     assert [note for note in read.notes if "rounded" in note] == [
         f"column 'x' holds integers such as {2**60 + 1}, which are rounded"
+    ]
+    # The first one that is rounded, to the largest one that is not.
+    read = _read(tmp_path, f"x,y,a\n{2**53 + 1},{2**53},go\n3,4,turn\n")
+    assert [note for note in read.notes if "rounded" in note] == [
+        f"column 'x' holds integers such as {2**53 + 1}, which are rounded"
     ]
 
 
