@@ -308,7 +308,7 @@ def input_options(
             progress=progress or ProgressBar(),
             tell=_tell,
             tell_counts=_tell_counts,
-            tell_notes=tell_notes or _list_notes,
+            tell_notes=tell_notes or _lister_of_notes(),
         ),
     )
 
@@ -319,11 +319,18 @@ def print_notes(notes: Iterable[str], to: TextIO | None = None) -> None:
         print(f"note: {note}.", file=to)
 
 
-def _list_notes(notes: tuple[str, ...]) -> None:
-    """Says how the inputs were read, beside what a command prints."""
-    print_notes(notes[:_LISTED], sys.stderr)
-    if len(notes) > _LISTED:
-        print(f"and {len(notes) - _LISTED} more notes: learn prints all of them", file=sys.stderr)
+def _lister_of_notes() -> Callable[[tuple[str, ...]], None]:
+    """Says how inputs were read, beside what a command prints, and once if it reads them twice."""
+    told: set[str] = set()
+
+    def tell(notes: tuple[str, ...]) -> None:
+        new = [note for note in notes if note not in told]
+        told.update(new)
+        print_notes(new[:_LISTED], sys.stderr)
+        if len(new) > _LISTED:
+            print(f"and {len(new) - _LISTED} more notes: learn prints all of them", file=sys.stderr)
+
+    return tell
 
 
 def _tell(aside: tuple[Aside, ...]) -> None:

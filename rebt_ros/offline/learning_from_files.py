@@ -15,6 +15,7 @@ from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.demonstration.repeated import repeated
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
+from rebt_ros.demonstration.valueless import valueless
 from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.learning import pipeline
@@ -103,7 +104,11 @@ def learn(
     paths = as_paths(inputs)
     loaded = load(paths, replace(reading, features=reading.features | frozenset(declared)))
     files = {one.name: path for one, path in zip(loaded.demonstrations, loaded.paths, strict=True)}
-    again = (*repeated(loaded.demonstrations), *apart(loaded.demonstrations))
+    again = (
+        *repeated(loaded.demonstrations),
+        *apart(loaded.demonstrations),
+        *valueless(loaded.demonstrations),
+    )
     tables = tuple(
         replace(table, robot=loaded.robot)
         for table in tabulate(loaded.demonstrations, declared, loaded.weights)

@@ -256,7 +256,8 @@ class Feed:
         """Remembers how old the states of rows are."""
         for row in rows:
             for name, stamp in self.last.items():
-                if row.stamp - stamp > _OLD:
+                # What has no time at all is told as such.
+                if row.stamp - stamp > _OLD and stamp > 0:
                     self.ages.setdefault(name, array("q")).append(row.stamp - stamp)
 
     def account(self, stated: int, demonstration: Demonstration) -> Account:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -88,7 +89,10 @@ def read_robot_bag(
             path, builder, skip_bad, there, decoders=decoders, topics=wanted, readers=readers
         )
         shown = feed.demonstration(
-            bag, _in_order(path, bag, wanted), [name for name, _ in wanted], sample_rate
+            bag,
+            _in_order(path, bag, wanted, feed.unstamped),
+            [name for name, _ in wanted],
+            sample_rate,
         )
         shown = replace(shown, features=described(shown.features, states, categories))
         return replace(feed.read(bag, set(wanted), shown), robot=robot)
@@ -101,6 +105,30 @@ class _RobotFeed(Feed):
     decoders: dict[Topic, Callable[[bytes], object]]
     topics: dict[Topic, BoundTopic]
     readers: dict[str, FeatureReader] = field(default_factory=dict)
+    unstamped: Counter[str] = field(default_factory=Counter)
+    """Messages whose headers should tell their times and do not, by topic."""
+
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know; see `Feed.notes`."""
+        return (
+            *(
+                f"{count} of {self.seen[topic]} messages on {topic!r} have no time in their "
+                "headers (0): leave out 'stamp: header' there, or have their publisher fill it in"
+                for topic, count in sorted(self.unstamped.items())
+            ),
+            *super(_RobotFeed, self).notes(),
+        )
+
+    def why_no_rows(self, topics: Sequence[str]) -> str:
+        """Why there are no rows, and what helps; see `Feed.why_no_rows`."""
+        sources = sorted(topic[0] for topic, one in self.topics.items() if one.labellers)
+        if all(self.seen[topic] for topic in topics) and not self.early and sources:
+            return (
+                f"no message on {', '.join(sources)} is an action to the robot file, or none is "
+                "held until a sample is due; see whether its labels, buttons, axes or dead band "
+                "are those of the robot"
+            )
+        return super(_RobotFeed, self).why_no_rows(topics)
 
     def pushed(self, topic: Topic, stamp: int, data: bytes) -> tuple[Row, ...]:
         """The rows that a message completes; see `Feed.pushed`."""
@@ -156,16 +184,24 @@ def _chosen(
     return chosen
 
 
-def _in_order(path: Path, bag: BagFiles, wanted: dict[Topic, BoundTopic]) -> Iterator[Message]:
+def _in_order(
+    path: Path, bag: BagFiles, wanted: dict[Topic, BoundTopic], unstamped: Counter[str]
+) -> Iterator[Message]:
     """The messages by when they are from."""
     messages = messages_of(path, bag, set(wanted))
     headed = {topic for topic, one in wanted.items() if one.has_stamp}
     if not headed:
         return messages
-    stamped = (
-        (topic, _stamp_of(data, stamp) if topic in headed else stamp, data)
-        for topic, stamp, data in messages
-    )
+
+    def own(topic: Topic, stamp: int, data: bytes) -> int:
+        if topic not in headed:
+            return stamp
+        said = _stamp_of(data, stamp)
+        if not said:
+            unstamped[topic[0]] += 1
+        return said
+
+    stamped = ((topic, own(topic, stamp, data), data) for topic, stamp, data in messages)
     return iter(by_time(stamped, lambda stamp: (GAP, stamp, b""), bag.note_set_back))
 
 

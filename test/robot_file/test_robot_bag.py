@@ -114,6 +114,24 @@ def test_messages_are_taken_by_the_stamps_in_their_headers_where_that_is_asked(
     assert received.demonstration.stamps.tolist() == [3]
 
 
+def test_headers_that_tell_no_time_are_noted_where_they_should(tmp_path: Path) -> None:
+    text = "topics: {/odom: {stamp: header}}\nstate: {x: /odom.pose.pose.position.x}\n"
+    text += "actions: {a: {joy: /joy, press: {0: go}}}\n"
+    odometry = [some.odometry(float(place)) for place in range(3)]
+    odometry[1].header.stamp.sec = 1_700_000_000
+    press = [some.joy(0), some.joy(), some.joy(0)]
+    messages = [(some.BEGIN + place, "/odom", one) for place, one in enumerate(odometry)]
+    messages += [(some.BEGIN + 3 + place, "/joy", one) for place, one in enumerate(press)]
+    bag = some.write_bag(tmp_path / "bag", messages)
+    read = read_robot_bag(bag, parse_robot_file(text))
+    assert [note for note in read.notes if "header" in note] == [
+        "2 of 3 messages on '/odom' have no time in their headers (0): leave out 'stamp: header' "
+        "there, or have their publisher fill it in"
+    ]
+    assert not [note for note in read.notes if "seconds old" in note]
+    assert not read_robot_bag(bag, parse_robot_file(text.replace("header", "received"))).notes
+
+
 def test_a_difference_is_that_of_one_message_to_the_next(tmp_path: Path) -> None:
     text = "state: {speed: /odom.pose.pose.position.x.@derivative}\nactions: {a: /a.data}"
     second = 1_000_000_000
@@ -134,7 +152,7 @@ def test_a_difference_is_that_of_one_message_to_the_next(tmp_path: Path) -> None
         ("state: {x: /mode.data}\nactions: {a: /void.data}", "'/void', which robot.yaml names"),
         (
             "state: {x: /mode.data}\nactions: {a: {joy: /joy, press: {9: go}}}",
-            "gives no rows: no action has a label",
+            "gives no rows: no message on /joy is an action to the robot file",
         ),
     ],
 )

@@ -179,6 +179,9 @@ def test_a_label_without_a_command_is_told(domain: int, peer: Peer, tmp_path: Pa
         ("{call: /a, type: std_srvs/srv/Nothing}", "the package std_srvs has no service 'Nothing'"),
         ("{call: /a, type: std_msgs/msg/Bool}", "is no name of a service type"),
         ("{action: /a, type: nav2_msgs/action/Spin}", "install ros-jazzy-nav2-msgs"),
+        ("{publish: cmd vel, type: std_msgs/msg/Bool}", "commands.go.publish is 'cmd vel', which"),
+        ("{call: /a//b, type: std_srvs/srv/Empty}", "commands.go.call is '/a//b', which is no"),
+        ("{action: /7up, type: test_msgs/action/Fibonacci}", "commands.go.action is '/7up', which"),
     ],
 )
 def test_a_command_that_cannot_be_ends_the_executor_with_a_sentence(

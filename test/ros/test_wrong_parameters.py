@@ -137,6 +137,14 @@ def test_what_the_learner_cannot_take_is_refused_while_it_runs_as_well(
         node.destroy_node()
 
 
+@pytest.mark.parametrize("units", ["[left]", "['=m']", "['left=']", "[left=m, right]"])
+def test_units_that_name_no_feature_or_no_unit_are_refused_at_once(
+    units: str, context: Context
+) -> None:
+    sentence = _refusal("learner", context, ["-p", f"units:={units}"])
+    assert sentence.endswith("which is not FEATURE=UNIT, such as left=m.")
+
+
 @pytest.mark.parametrize("node", NODES)
 @pytest.mark.parametrize(
     ("arguments", "sentence"),

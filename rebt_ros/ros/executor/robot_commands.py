@@ -7,8 +7,10 @@ from typing import Any, Final
 
 from py_trees.common import Status
 from rclpy.action.client import ActionClient
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.validate_topic_name import validate_topic_name
 
 from rebt_ros.errors import MessagePathError
 from rebt_ros.live.long_command import NOTHING, LongCommand, Running
@@ -44,7 +46,7 @@ class RobotCommands:
         note: Told of calls and goals that fail.
 
     Raises:
-        RobotFileError: A type is not installed, or has no such field.
+        RobotFileError: A type is not installed or has no such field, or a name is none.
     """
 
     def __init__(self, node: Node, robot: RobotFile, note: Callable[[str], None]) -> None:
@@ -115,12 +117,25 @@ class RobotCommands:
     def _open(self, label: str, command: Command) -> None:
         match command:
             case PublishCommand():
+                self._check_name(label, "publish", command.topic)
                 send = self._publishing(label, command)
                 (self._each_tick if command.each_tick else self._once)[label] = send
             case CallCommand():
+                self._check_name(label, "call", command.service)
                 self._open_long(label, self._calling(label, command))
             case GoalCommand():
+                self._check_name(label, "action", command.server)
                 self._open_long(label, self._reaching(label, command))
+
+    def _check_name(self, label: str, part: str, name: str) -> None:
+        """Refuses what no topic, service or action server can be called, before it is opened."""
+        try:
+            validate_topic_name(name)
+        except InvalidTopicNameException as err:
+            raise RobotFileError(
+                f"{self._name}: commands.{label}.{part} is {name!r}, which is no name in ROS 2: "
+                "it has letters, digits and _ between slashes, such as /cmd_vel."
+            ) from err
 
     def _open_long(self, label: str, begin: _Begin) -> None:
         self._begins[label] = begin

@@ -222,6 +222,8 @@ def _form(declare: Parameters) -> dict[str, Callable[[], object]]:
         "each other.",
         fixed=False,
     )
+    # Said at the start, not only after a first demonstration.
+    _units(units())
     return {
         "delta": declare.number(
             "delta",

@@ -1,0 +1,40 @@
+"""Features of messages that have no value in a whole demonstration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from rebt_ros.demonstration.demonstration import Demonstration
+
+#: So many demonstrations are named.
+_NAMED = 3
+
+
+def valueless(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
+    """Notes on features that are read from messages and are missing in all rows of some.
+
+    A path may be right and lead to nothing: a misspelled joint, an index or an angle beyond the
+    ends of an array, values that are none of the feature's categories.
+
+    >>> list(valueless([]))
+    []
+    """
+    lacking: dict[tuple[str, str], list[str]] = {}
+    for one in demonstrations:
+        if not len(one.stamps):
+            continue
+        for place, feature in enumerate(one.features):
+            if feature.topic and np.isnan(one.states[:, place]).all():
+                lacking.setdefault((feature.name, feature.topic), []).append(one.name)
+    for (name, topic), those in sorted(lacking.items()):
+        if len(those) == len(demonstrations):
+            where = "in any row"
+        else:
+            named = ", ".join(those[:_NAMED]) + (", …" if len(those) > _NAMED else "")
+            where = f"in {len(those)} of {len(demonstrations)} demonstrations ({named})"
+        yield (
+            f"feature {name!r} has no value {where}: see whether its path, kind and categories fit "
+            f"what comes on {topic!r}"
+        )
