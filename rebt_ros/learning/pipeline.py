@@ -191,6 +191,12 @@ def learn_from(
             "rows are made up for rare actions, which have no weights, where the demonstrations "
             "have some: leave out the upsampling or the weights."
         )
+    names = [feature.name for feature in table.features]
+    if unknown := sorted(set(options.units) - set(names)):
+        raise OptionError(
+            f"there is no feature {unknown[0]!r}, which is given a unit: the features are "
+            f"{', '.join(names)}."
+        )
     late = reaction_time_of(table, options)
     table = shifted(table, late.rows)
     if len(np.unique(table.chosen)) < 2:

@@ -41,14 +41,14 @@ def check_topics(node: Node, states: Iterable[str], commands: Iterable[str]) -> 
     wanted = [("commands on", name, String) for name in commands]
     wanted += [("reads the state topic", name, Float64MultiArray) for name in states]
     for does, name, kind in wanted:
-        full = _full_name(node, name)
+        full = full_name(node, name)
         if full is None:
             raise DocumentError(f"the tree {does} {name!r}, which is no name of a topic.")
         if types.setdefault(full, kind) is not kind:
             raise DocumentError(f"the tree {does} {name!r}, which carries something else.")
 
 
-def _full_name(node: Node, name: str) -> str | None:
+def full_name(node: Node, name: str) -> str | None:
     """The name after expansion and remapping; None where there is none."""
     # Names are C strings to ROS, so that it would not see what follows a NUL.
     if not name.isprintable():

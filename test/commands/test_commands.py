@@ -217,6 +217,7 @@ def test_replay_refuses_a_recording_without_the_features_of_the_tree(
         (("learn", "TABLE", "--attach", "psa-9"), "'psa-9'"),
         (("learn", "TABLE", "--binary", "front"), "'front' cannot be binary"),
         (("learn", "TABLE", "--categorical", "wheel"), "no feature 'wheel'"),
+        (("learn", "TABLE", "--unit", "wheel=m"), "no feature 'wheel', which is given a unit"),
         (("replay", "TABLE", "TABLE"), "is a demonstration, and no tree"),
         (("replay", "nowhere.json", "TABLE"), "nowhere.json"),
     ],

@@ -7,10 +7,8 @@ from typing import Any, Final
 
 from py_trees.common import Status
 from rclpy.action.client import ActionClient
-from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.validate_topic_name import validate_topic_name
 
 from rebt_ros.errors import MessagePathError
 from rebt_ros.live.long_command import NOTHING, LongCommand, Running
@@ -27,6 +25,7 @@ from rebt_ros.robot_file.robot_file import (
 from rebt_ros.ros.message_types import action_class, message_class, service_class
 from rebt_ros.ros.message_values import fill
 from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
+from rebt_ros.ros.topic_names import full_name
 
 #: What action_msgs/msg/GoalStatus calls a goal that was reached.
 _SUCCEEDED: Final = 4
@@ -129,13 +128,11 @@ class RobotCommands:
 
     def _check_name(self, label: str, part: str, name: str) -> None:
         """Refuses what no topic, service or action server can be called, before it is opened."""
-        try:
-            validate_topic_name(name)
-        except InvalidTopicNameException as err:
+        if full_name(self._node, name) is None:
             raise RobotFileError(
                 f"{self._name}: commands.{label}.{part} is {name!r}, which is no name in ROS 2: "
                 "it has letters, digits and _ between slashes, such as /cmd_vel."
-            ) from err
+            )
 
     def _open_long(self, label: str, begin: _Begin) -> None:
         self._begins[label] = begin
