@@ -194,7 +194,7 @@ def test_one_action_only_on_one_of_two_channels_is_refused_with_its_name() -> No
     rows = [*builder.act(1, "arm", "grasp"), *builder.act(2, "base", "go")]
     rows += builder.act(3, "base", "wait")
     both = Demonstration.from_rows("both", builder.features or (), rows)
-    with pytest.raises(InputError, match="channel 'arm' show one action only"):
+    with pytest.raises(InputError, match="the only row of channel 'arm' shows one action only"):
         learn([both])
 
 
