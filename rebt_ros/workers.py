@@ -5,6 +5,7 @@ joblib does it in both cases.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import functools
 import os
@@ -117,6 +118,14 @@ def _end_with(parent: int | None) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
+async def _reach(address: str) -> None:
+    """Connects to a Dask scheduler, and leaves again."""
+    from distributed.comm.core import connect
+
+    comm = await connect(address, timeout=_PATIENCE)
+    await comm.close()
+
+
 @contextlib.contextmanager
 def _cluster(address: str) -> Iterator[None]:
     """Lets joblib use a Dask cluster.
@@ -137,7 +146,14 @@ def _cluster(address: str) -> Iterator[None]:
             "joblib 1.4 or newer."
         )
     try:
+        # First without a client, which would wait 20 s for itself after a failure.
+        asyncio.run(_reach(address))
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except MemoryError as err:
+        # What another server answers, "HTTP/1.1", is read as the length of a message.
+        raise WorkerError(
+            f"what answers at {address} is not a Dask scheduler: {_SUCH_AS}."
+        ) from err
     except (OSError, ValueError) as err:
         raise WorkerError(f"no Dask scheduler answers at {address} ({err}): {_SUCH_AS}.") from err
     with client:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import socket
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +25,7 @@ from rebt_ros.storage.inputs import Loaded, load
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.read_cache import default_cache
 from rebt_ros.storage.recording import RecordingWriter
+from rebt_ros.workers import WorkerError
 
 COUNT = 6
 
@@ -296,6 +299,21 @@ def test_a_dask_cluster_gives_the_same(fleet: Path, tmp_path: Path) -> None:
         assert_equal(loaded(fleet, scheduler=address, cache=tmp_path / "cache"), alone)
         assert len(list((tmp_path / "cache").rglob("*.columns"))) == COUNT - 1
         assert_equal(loaded(fleet, scheduler=address), alone)
+
+
+def test_a_web_server_is_not_taken_for_a_dask_scheduler(fleet: Path) -> None:
+    pytest.importorskip("distributed")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+                connection.recv(1)
+
+        threading.Thread(target=answer, daemon=True).start()
+        with pytest.raises(WorkerError, match="is not a Dask scheduler"):
+            loaded(fleet, scheduler=f"tcp://127.0.0.1:{server.getsockname()[1]}")
 
 
 @pytest.mark.parametrize("jobs", [0])
