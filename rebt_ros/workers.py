@@ -13,7 +13,7 @@ import re
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Literal, TypeVar
 
@@ -146,8 +146,10 @@ def _cluster(address: str) -> Iterator[None]:
             "joblib 1.4 or newer."
         )
     try:
-        # First without a client, which would wait 20 s for itself after a failure.
-        asyncio.run(_reach(address))
+        # First without a client, which would wait 20 s for itself after a failure; in a thread, as
+        # notebooks have an event loop in theirs.
+        with ThreadPoolExecutor(1) as pool:
+            pool.submit(lambda: asyncio.run(_reach(address))).result()
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except MemoryError as err:
         # What another server answers, "HTTP/1.1", is read as the length of a message.
