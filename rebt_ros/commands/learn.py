@@ -368,7 +368,7 @@ def _recalls(report: LearningReport) -> Iterator[str]:
             f"cross-validation, where always taking the most frequent action would reach "
             f"{report.most_frequent:.1%}"
         )
-        yield f"  (agreement in cross-validation is the forecast of success: {FORECAST})"
+        yield f"  (agreement in cross-validation is the forecast of success, though {FORECAST})"
 
 
 def _smaller(channel: str, policy: ChosenPolicy, judged: JudgedLevels) -> Iterator[str]:

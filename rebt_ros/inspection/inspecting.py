@@ -166,7 +166,7 @@ def _notes(rows: Joined) -> Iterator[str]:
     """What was not looked for."""
     count = len(rows.starts) - 1
     if count < outliers.FEWEST:
-        yield f"of fewer than {outliers.FEWEST} demonstrations none is an outlier"
+        yield f"outliers are told among {outliers.FEWEST} or more demonstrations only"
     if count > duplicates.MOST_DEMONSTRATIONS:
         yield (
             f"near-duplicates are not looked for among more than {duplicates.MOST_DEMONSTRATIONS} "

@@ -29,7 +29,7 @@ from rebt_ros.learning.sample_report import SampleReport
 #: How well agreement in cross-validation ranks the trees of one task by their success (Spearman's
 #: rho): 0.6 where trees of the same demonstrations were compared, 0.2 over sets and numbers of
 #: demonstrations in docs/driving.md.
-FORECAST = "a weak one: rank correlation with success 0.2 to 0.6 within a task"
+FORECAST = "weak: rank correlation with success 0.2 to 0.6 within a task"
 
 #: So many actions are listed in a sentence.
 _LISTED = 12

@@ -336,7 +336,7 @@ def test_what_is_far_from_the_rest_is_an_outlier() -> None:
 def test_of_few_demonstrations_none_is_an_outlier() -> None:
     found = inspect([drive("first"), drive("second", 1), drive("long", 2, 900)])
     assert [one.outliers for one in found.demonstrations] == [()] * 3
-    assert found.notes == ("of fewer than 5 demonstrations none is an outlier",)
+    assert found.notes == ("outliers are told among 5 or more demonstrations only",)
 
 
 def test_features_that_never_vary_are_named_here_and_everywhere() -> None:
