@@ -160,7 +160,7 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
         return ReactionTime(0, _seconds(0, gap), why_not)
     explanations = _Explanations(table, most)
     trials, by_states_alone = explanations.trials()
-    rows, in_bits = _clear(trials, len(explanations)), False
+    rows, in_bits = explanations.clear(trials), False
     if not rows and len(trials) > 1:
         rows, described = explanations.described()
         in_bits = rows > 0
@@ -216,6 +216,18 @@ class _Explanations:
     def __len__(self) -> int:
         """Rows that are explained."""
         return len(self._rows)
+
+    def clear(self, trials: Sequence[Trial]) -> int:
+        """The delay that is clear, or 0.
+
+        Where the longest one is the best, as half a run late hardly a border is needed any more, it
+        is that of those shorter than half a run, if it brings the explanation to a third.
+        """
+        if _peak(trials) is not trials[-1]:
+            return _clear(trials, len(self))
+        shorter = [one for one in trials if one.rows < max(self._half_a_run, 1)]
+        much_simpler = _peak(shorter).size <= _MUCH_SIMPLER * trials[0].size
+        return _clear(shorter, len(self)) if much_simpler else 0
 
     def described(self) -> tuple[int, tuple[Trial, ...]]:
         """The delay at which states and previous actions describe the rows clearly best, or 0.

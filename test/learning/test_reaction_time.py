@@ -446,6 +446,15 @@ def test_where_several_delays_explain_the_rows_round_borders_tell_which(
     assert sizes.count(min(sizes)) > 1
 
 
+@pytest.mark.parametrize("seed", range(0, 60, 20))
+def test_half_a_run_late_no_border_is_needed_and_a_shorter_delay_is_still_told(seed: int) -> None:
+    table = joined(*(shuttle(2, seed + number, turns=4, wall=0.5) for number in range(3)))
+    found = estimate(paced(table, TENTH // 2))
+    assert found.rows == 2
+    sizes = [one.size for one in found.trials]
+    assert sizes[-1] <= min(sizes[:-1])
+
+
 def test_borders_that_are_no_rounder_do_not_move_a_delay() -> None:
     sloped = joined(*(shuttle(3, seed, leg=9.37) for seed in range(20)))
     assert estimate(sloped).rows == 3
