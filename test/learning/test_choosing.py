@@ -420,7 +420,7 @@ def test_history_is_tested_where_it_makes_the_explanation_simpler_or_raises_reca
         and with_previous.leaves <= alone.leaves
         and with_previous.comparisons < alone.comparisons
     )
-    tested = with_it <= 0.8 * without or fewer or (with_it <= without and clearly)
+    tested = with_it <= 0.875 * without or fewer or (with_it <= without and clearly)
     nodes_alone, nodes_with_previous = (
         nodes.size(convert_shown(one.at(0.0), LearnOptions(), rows, psa=False))
         for one in (alone, with_previous)
