@@ -274,9 +274,8 @@ def _stand_ins(values: FloatArray) -> Iterable[tuple[float, int]]:
             continue
         if len(np.unique(others)) < _FEWEST_OTHERS:
             continue
-        with np.errstate(
-            over="ignore"
-        ):  # What is as large as that is refused later, in a sentence.
+        # What is as large as that is refused later, in a sentence.
+        with np.errstate(over="ignore"):
             distance = np.abs(others - number).min()
             spread = _FAR * max(np.ptp(others), np.abs(others).max())
         if distance > spread:

@@ -46,7 +46,9 @@ class _Node:
         self.publishers: dict[str, _Publisher] = {}
         self.warned: list[str] = []
 
-    def create_publisher(self, _: type[Any], topic: str, __: Any) -> _Publisher:
+    def create_publisher(
+        self, _: type[Any], topic: str, __: Any, *, event_callbacks: Any
+    ) -> _Publisher:
         self.publishers[topic] = _Publisher(topic)
         return self.publishers[topic]
 
