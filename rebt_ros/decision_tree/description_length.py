@@ -19,7 +19,7 @@ from rebt_ros.decision_tree.encoding import Number
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.tree import DecisionTree, Split
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import Threshold
+from rebt_ros.logic.conditions import Quantity, Threshold
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +66,18 @@ def border_bits(tree: DecisionTree, table: DemonstrationTable) -> float:
         tree: With thresholds that are as round as they can be.
         table: The rows that it parts.
     """
-    borders = {
-        node.condition
-        for node in tree.walk()
-        if isinstance(node, Split) and isinstance(node.condition, Threshold)
-    }
+    borders: dict[Quantity, set[float]] = {}
+    for node in tree.walk():
+        match node:
+            # Whatever the largest value is, 0 is the only multiple that is needed.
+            case Split(condition=Threshold(quantity=quantity, value=value)) if value:
+                borders.setdefault(quantity, set()).add(value)
     tests = StateTests(table.features)
     bits = 0.0
-    for border in borders:
-        values = np.abs(tests.reading(border.quantity)(table.states.T))
+    for quantity, its in borders.items():
+        values = np.abs(tests.reading(quantity)(table.states.T))
         largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
-        if border.value:
-            bits += max(math.log2(largest) - math.log2(_power_of_ten(border.value)), 0.0)
+        bits += sum(max(math.log2(largest) - math.log2(_power_of_ten(value)), 0.0) for value in its)
     return bits
 
 

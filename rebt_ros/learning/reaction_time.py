@@ -282,8 +282,9 @@ class _Explanations:
         later = takewhile(explains, range(rows + 1, near[1]))
         bits: dict[int, float] = {}
         for delay in sorted({*tried, *earlier, *later}):
-            explained = self._fitted(delay, vocabulary).readable_explained(self._late(delay))
-            bits[delay] = border_bits(explained.tree, self._late(delay))
+            late = self._late(delay)
+            explained = self._fitted(delay, vocabulary).readable_explained(late)
+            bits[delay] = border_bits(explained.tree, late)
         best = min(bits, key=lambda delay: (bits[delay], abs(delay - rows)))
         return best if bits[best] <= bits[rows] - _ROUNDER else rows
 

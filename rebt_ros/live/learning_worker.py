@@ -170,11 +170,9 @@ def learn(
         RebtError: They cannot be used, or an option makes no sense.
     """
     from rebt_ros.behavior_tree.document import dumps
-    from rebt_ros.demonstration.apart import apart
-    from rebt_ros.demonstration.repeated import repeated
     from rebt_ros.demonstration.schema import FeatureKind
     from rebt_ros.demonstration.table import tabulate
-    from rebt_ros.demonstration.valueless import valueless
+    from rebt_ros.demonstration.together import notes_together
     from rebt_ros.learning import pipeline
     from rebt_ros.learning.options import LearnOptions
     from rebt_ros.offline.result import OfflineLearning
@@ -208,11 +206,7 @@ def learn(
     learned = kept.learned
     notes = list(no_recordings(Path(request.demonstrations)))
     notes += [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
-    notes += (
-        *repeated(demonstrations),
-        *apart(demonstrations),
-        *valueless(demonstrations),
-    )
+    notes += notes_together(demonstrations)
     notes += [note for learning in learnings for note in learning.notes]
     led = {
         f"{learning.table.channel}: " if len(learnings) > 1 else "": learning.report

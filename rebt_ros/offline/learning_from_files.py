@@ -10,12 +10,10 @@ from typing import TypeVar
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, unmeasurable
-from rebt_ros.demonstration.apart import apart
 from rebt_ros.demonstration.demonstration import Demonstration
-from rebt_ros.demonstration.repeated import repeated
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
-from rebt_ros.demonstration.valueless import valueless
+from rebt_ros.demonstration.together import notes_together
 from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.learning import pipeline
@@ -104,11 +102,7 @@ def learn(
     paths = as_paths(inputs)
     loaded = load(paths, replace(reading, features=reading.features | frozenset(declared)))
     files = {one.name: path for one, path in zip(loaded.demonstrations, loaded.paths, strict=True)}
-    again = (
-        *repeated(loaded.demonstrations),
-        *apart(loaded.demonstrations),
-        *valueless(loaded.demonstrations),
-    )
+    together = tuple(notes_together(loaded.demonstrations))
     tables = tuple(
         replace(table, robot=loaded.robot)
         for table in tabulate(loaded.demonstrations, declared, loaded.weights)
@@ -128,7 +122,7 @@ def learn(
         kept = _ruled(learned, asked, loaded.demonstrations, repair)
         learned, proven = kept.learned, kept.rules
     weights = _weights(tables[0])
-    notes = (*loaded.notes, *again, *_on_weights(weights), *further, *_not_on_a_robot(learned))
+    notes = (*loaded.notes, *together, *_on_weights(weights), *further, *_not_on_a_robot(learned))
     result = OfflineLearning(
         learned,
         learnings,
