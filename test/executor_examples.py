@@ -213,6 +213,20 @@ class SimulatedTime:
 
         return values_of(self.wait(arrived, "a report of now"))
 
+    def feed(self) -> None:
+        """Sends the state until the executor has it, so that the next tick does not come first.
+
+        The state and the time go by two topics: nothing says which of them is heard first.
+        """
+
+        anew = self._peer.anew(EXECUTION)
+
+        def running() -> bool:
+            said = anew()
+            return said is not None and values_of(said)["condition"] == "running"
+
+        self.until(running, "a report that the state has arrived")
+
     def go_on(self, ticks: int) -> None:
         """Goes on, whatever that sets off; the executor may not come along and miss some ticks."""
         for _ in range(ticks):

@@ -298,6 +298,7 @@ def test_a_tree_looks_back_at_ticks_since_it_was_last_halted_or_swapped(
         clock.commanded()
 
         def looks_back_from_now_on() -> None:
+            clock.feed()
             assert [clock.tick().label for _ in range(3)] == ["turn", "go", "go"]
 
         assert [one.label for one in commands] == ["turn", *["go"] * (len(commands) - 1)]
