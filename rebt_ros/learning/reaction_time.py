@@ -63,7 +63,7 @@ _ROWS, _STRETCHES = 2_000, 10
 _ALONE = 1.5
 #: ... and if the delay is less than half of the time for which an action is held, with a margin.
 #: Who goes to and fro between two places turns round half a run after passing the middle.
-_HALF_A_RUN = 0.45
+_MARGIN = 0.9
 #: Where previous actions bring the explanation to this share, without a delay, a task needs memory;
 #: then a delay of half a run or more has to do as much.
 _MUCH_SIMPLER = 1 / 3
@@ -210,7 +210,7 @@ class _Explanations:
         place, _ = places(table)
         # Rows whose state and previous action are known whatever the delay is.
         self._rows = _stretches(np.flatnonzero(place >= most))
-        self._half_a_run = _HALF_A_RUN * _usual_run(table)
+        self._half_a_run = _MARGIN * _half_a_run(table)
         self._trees: dict[tuple[int, Vocabulary], FittedTree] = {}
 
     def __len__(self) -> int:
@@ -362,11 +362,21 @@ def _stretches(rows: IntArray) -> IntArray:
     return np.asarray(rows[(begins[:, None] + np.arange(length)).ravel()])
 
 
-def _usual_run(table: DemonstrationTable) -> float:
-    """Rows from the first to the last one of an action that is held: the mean over all rows."""
+def _half_a_run(table: DemonstrationTable) -> float:
+    """Rows after which someone who goes to and fro turns round, from the place in between.
+
+    Who takes a rows there and b rows back passes one place ab / (a + b) rows before each end: half
+    a run, where both take as long.  The mean over pairs of successive runs; long ones count more,
+    as single rows within a run may be mistakes.  Infinite where there are no such pairs.
+    """
     begins = np.flatnonzero(table.previous != table.chosen)
-    lengths = np.diff(np.append(begins, len(table)))
-    return float(np.sum(lengths**2) / np.sum(lengths)) - 1
+    runs = np.diff(np.append(begins, len(table))).astype(np.float64)
+    together = table.demonstration[begins[1:]] == table.demonstration[begins[:-1]]
+    there, back = runs[:-1][together], runs[1:][together]
+    weights = there * back
+    if not len(weights):
+        return math.inf
+    return float(np.sum(weights * weights / (there + back)) / np.sum(weights))
 
 
 def _clear(trials: Sequence[Trial], explained: int) -> int:

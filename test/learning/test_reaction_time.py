@@ -382,6 +382,24 @@ def test_who_goes_on_until_another_border_is_not_late(count: int, seed: int) -> 
     assert estimate(paced(table, TENTH // 2)).rows == 0
 
 
+def heater(seed: int, rows: int = 300) -> tuple[list[list[float]], list[int]]:
+    """Heats below 18 degrees until 22: warms up in a few rows, and cools down in more."""
+    chance = random.Random(seed)
+    degrees, outside, heats = chance.uniform(12, 26), chance.uniform(0, 12), False
+    states, actions = [], []
+    for _ in range(rows):
+        heats = degrees < 18 or (heats and degrees <= 22)
+        states.append([round(degrees, 2), round(outside, 2)])
+        actions.append(int(heats))
+        degrees += 0.9 * heats + 0.03 * (outside - degrees)
+    return states, actions
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 8, 23, 25, 36])
+def test_who_takes_longer_one_way_than_the_other_is_not_late(seed: int) -> None:
+    assert estimate(paced(joined(heater(seed)), TENTH // 2)).rows == 0
+
+
 @pytest.mark.parametrize("late", [2, 4])
 def test_who_goes_on_until_another_border_may_be_late_too(late: int) -> None:
     table = joined(*(fan(late, number) for number in range(20)))
