@@ -102,9 +102,9 @@ def choose(
     Raises:
         OptionError: There is no such pruning level as is asked for.
     """
-    if len(table) < _FEWEST_ROWS:
-        return _unjudged(table, options)
     choice = _Choice(table, options, _Steps(advance), held_out)
+    if len(table) < _FEWEST_ROWS:
+        return _unjudged(table, options, choice)
     vocabulary = choice.vocabulary()
     judged = choice.judged(vocabulary)
     levels = judged.levels(partial(own_history_choices, options=options, psa=False))
@@ -150,6 +150,8 @@ def _level(levels: JudgedLevels, shown: DemonstrationTable) -> tuple[float, str]
             "prune: the tree is not pruned."
         )
     recalls, chosen, largest = levels.mean_recalls, levels.chosen, levels.largest
+    best = levels.best_without_mistakes
+    kind = "" if best == levels.best else " of those that give up only what looks like mistakes"
     ccp_alpha = float(levels.ccp_alphas[chosen])
     simpler = ""
     if chosen != largest:
@@ -160,8 +162,8 @@ def _level(levels: JudgedLevels, shown: DemonstrationTable) -> tuple[float, str]
         )
     return ccp_alpha, (
         f"Of {len(recalls)} pruning levels, ccp_alpha = {ccp_alpha:.3g} makes the largest tree "
-        f"whose mean recall ({recalls[chosen]:.1%}) is not clearly below the best "
-        f"({recalls[levels.best]:.1%}; {recalls[0]:.1%} unpruned){simpler}."
+        f"whose mean recall ({recalls[chosen]:.1%}) is not clearly below the best{kind} "
+        f"({recalls[best]:.1%}; {recalls[0]:.1%} unpruned){simpler}."
     )
 
 
@@ -174,12 +176,17 @@ def _of_another_fit(
     return judged.path.middle(ccp_alpha) if asked is None else asked
 
 
-def _unjudged(table: DemonstrationTable, options: LearnOptions) -> ChosenPolicy:
-    """Without cross-validation: no pruning, history and PSA only where they are asked for."""
-    fitted = fit(table, fit_options(options, Vocabulary(options.history or History.NONE)))
+def _unjudged(table: DemonstrationTable, options: LearnOptions, choice: _Choice) -> ChosenPolicy:
+    """Without cross-validation: no pruning, and PSA only where it is asked for.
+
+    The previous action is tested where that makes the explanation simpler.
+    """
+    history = choice.history_of_explanations()
+    fitted = fit(table, fit_options(options, Vocabulary(history)))
     reason = f"{len(table)} rows are too few to choose by: the tree is not pruned."
     ccp_alpha = _asked_for(fitted, options) or 0.0
-    return ChosenPolicy(fitted, ccp_alpha, options.psa is Use.ALWAYS, None, (reason,))
+    reasons = (*choice.reasons, reason)
+    return ChosenPolicy(fitted, ccp_alpha, options.psa is Use.ALWAYS, None, reasons)
 
 
 def _leaves(fitted: FittedTree, ccp_alpha: float) -> int:
@@ -188,6 +195,12 @@ def _leaves(fitted: FittedTree, ccp_alpha: float) -> int:
 
 def _size(fitted: FittedTree) -> str:
     return f"{fitted.leaves} leaves and {fitted.comparisons} comparisons of numbers"
+
+
+def _in_words(explanations: tuple[int, int]) -> str:
+    """Sizes of explanations without the previous action and with it."""
+    before, after = explanations
+    return f"{after} leaves and exceptions explain the rows, {before} without it"
 
 
 def _always_changes(table: DemonstrationTable) -> bool:
@@ -280,48 +293,78 @@ class _Choice:
         self.reasons.append(f"Weighted sums of features make a simpler tree ({compared}).")
         return with_them
 
+    def history_of_explanations(self) -> History:
+        """Whether the tree may test the previous action, where nothing else can be judged."""
+        if self._options.history is not None:
+            return self._options.history
+        if _always_changes(self._telling):
+            return History.NONE
+        told, reason = self._explained(FEATURES_ALONE, self._compared(FEATURES_ALONE))
+        if told is None:
+            return History.NONE
+        self.reasons.append(reason)
+        return told
+
     def _history(self, states_alone: Vocabulary) -> History:
         asked = self._options.history
         if asked is not None:
             return asked
-        with_it = replace(states_alone, history=History.PREVIOUS)
-        before, after = (self._fitted(one).explanation for one in (states_alone, with_it))
-        compared = f"{after} leaves and exceptions explain the rows, {before} without it"
+        sizes = self._compared(states_alone)
         if _always_changes(self._telling):
-            return self._history_of_changes(states_alone, compared)
-        if after <= _MUCH_SIMPLER * before:
-            self.reasons.append(f"The previous action is tested: {compared}.")
-            return History.PREVIOUS
-        if after > before:
-            self.reasons.append(f"The previous action is not tested: {compared}.")
-            return History.NONE
-        if after == before:
-            without_it, with_previous = (
-                simplest(self._telling, self._fitted(one)) for one in (states_alone, with_it)
-            )
-            sizes = self._sizes(without_it, with_previous)
-            if sizes[0] != sizes[1]:
-                tested = sizes[1] < sizes[0]
-                self.reasons.append(
-                    f"The previous action is {'tested' if tested else 'not tested'}: {compared}, "
-                    f"and the behavior tree has {sizes[1]} nodes with it, {sizes[0]} without."
-                )
-                return History.PREVIOUS if tested else History.NONE
-            if _simpler(with_previous, without_it):
-                self.reasons.append(
-                    f"The previous action is tested: {compared}, and {with_previous.comparisons} "
-                    f"comparisons of numbers do instead of {without_it.comparisons}."
-                )
-                return History.PREVIOUS
+            return self._history_of_changes(states_alone, _in_words(sizes))
+        told, reason = self._explained(states_alone, sizes)
+        if told is not None:
+            self.reasons.append(reason)
+            return told
         judged = self._unpruned(states_alone)
         raised = clearly_raised(*judged)
         without, recall = (levels.mean_recalls[0] for levels in judged)
         self.reasons.append(
-            f"The previous action is {'tested' if raised else 'not tested'}: {compared}, and mean "
-            f"recall after its own choices is {'' if raised else 'not '}clearly higher "
+            f"The previous action is {'tested' if raised else 'not tested'}: {_in_words(sizes)}, "
+            f"and mean recall after its own choices is {'' if raised else 'not '}clearly higher "
             f"({recall:.1%}, {without:.1%} without it)."
         )
         return History.PREVIOUS if raised else History.NONE
+
+    def _compared(self, states_alone: Vocabulary) -> tuple[int, int]:
+        """The sizes of explanations without the previous action and with it."""
+        with_it = replace(states_alone, history=History.PREVIOUS)
+        return self._fitted(states_alone).explanation, self._fitted(with_it).explanation
+
+    def _explained(
+        self, states_alone: Vocabulary, explanations: tuple[int, int]
+    ) -> tuple[History | None, str]:
+        """What explanations say about the previous action, and why; None where they leave it open.
+
+        Args:
+            states_alone: What else may be tested.
+            explanations: Their sizes without the previous action and with it.
+        """
+        before, after = explanations
+        compared = _in_words(explanations)
+        if after <= _MUCH_SIMPLER * before:
+            return History.PREVIOUS, f"The previous action is tested: {compared}."
+        if after > before:
+            return History.NONE, f"The previous action is not tested: {compared}."
+        if after < before:
+            return None, ""
+        without_it, with_previous = (
+            simplest(self._telling, self._fitted(replace(states_alone, history=history)))
+            for history in (History.NONE, History.PREVIOUS)
+        )
+        sizes = self._sizes(without_it, with_previous)
+        if sizes[0] != sizes[1]:
+            tested = sizes[1] < sizes[0]
+            return History.PREVIOUS if tested else History.NONE, (
+                f"The previous action is {'tested' if tested else 'not tested'}: {compared}, "
+                f"and the behavior tree has {sizes[1]} nodes with it, {sizes[0]} without."
+            )
+        if _simpler(with_previous, without_it):
+            return History.PREVIOUS, (
+                f"The previous action is tested: {compared}, and {with_previous.comparisons} "
+                f"comparisons of numbers do instead of {without_it.comparisons}."
+            )
+        return None, ""
 
     def _history_of_changes(self, states_alone: Vocabulary, compared: str) -> History:
         """Where the action of each row is another one than the previous action.

@@ -7,6 +7,11 @@ clearly worse, and pruned.  Elsewhere the few rows that decide a task stay.
 Where a small tree has few rows for each leaf, a single fold does not make that clear: what it is
 judged by, such as the only row in which a door is opened, is then all that there was to learn from.
 
+Few demonstrations judge by few rows, and rows that they hardly show, such as those that brake, may
+be what a task needs.  So where leaves have few rows, only levels count that give up nothing but
+what looks like mistakes.  To part a mistake from the rows of another action all around it takes two
+more leaves; each step in which a tree follows a slanted or curved border takes one.
+
 Few demonstrations often leave the level open, also where they err.  Then a tree that parts each
 mistake from the rows around it has more leaves than a smaller one has leaves and exceptions.  Where
 that is clear, by a standard error of such counts, the smaller one is chosen.
@@ -30,6 +35,10 @@ _CLEAR = 0.75
 _CLEAR_OF_FEW = 1.0
 #: With fewer rows for each leaf, the size of an explanation tells nothing.
 _LEAST_ROWS_PER_LEAF = 10
+#: With fewer rows for each leaf, only what looks like mistakes is given up: rows that take at least
+#: this share of the leaves that mistakes would take.
+_FEW_ROWS_PER_LEAF = 30
+_LIKE_MISTAKES = 0.8
 #: Leaves of a small tree, which a person could read without pruning.
 _MOST_LEAVES = 30
 
@@ -83,12 +92,22 @@ class JudgedLevels:
         return int(np.argmax(np.round(self.mean_recalls, 12)))
 
     @property
+    def best_without_mistakes(self) -> int:
+        """The best of the levels that give up nothing but what looks like mistakes.
+
+        Where leaves have many rows, it is the best of all.
+        """
+        recalls = np.round(self.mean_recalls, 12)
+        return int(np.argmax(np.where(self._gives_up_mistakes, recalls, -np.inf)))
+
+    @property
     def chosen(self) -> int:
         """The largest tree that is neither clearly worse nor clearly less simple than another one.
 
-        It is not smaller than the best.
+        It is not smaller than the best without mistakes.
         """
-        as_good, sizes = self._as_good, self.explanations[: self.best + 1]
+        as_good = self._as_good
+        sizes = self.explanations[: len(as_good)]
         least = sizes[as_good].min()
         chosen = int(np.argmax(as_good & (sizes - least <= np.sqrt(sizes + least))))
         # Few rows are explained by many small trees, most of them by chance.
@@ -96,16 +115,36 @@ class JudgedLevels:
 
     @property
     def largest(self) -> int:
-        """The largest tree that is not clearly worse than the best."""
+        """The largest tree that is not clearly worse than the best without mistakes."""
         return int(np.argmax(self._as_good))
 
     @property
     def _as_good(self) -> BoolArray:
-        """Whether each level, up to the best, is not clearly worse than it, shape (best + 1,)."""
-        contributions = self.contributions[:, : self.best + 1]
+        """Whether each level, up to the best without mistakes, may be chosen.
+
+        Those may that give up nothing but what looks like mistakes and are not clearly worse.
+        """
+        levels = self.best_without_mistakes + 1
+        contributions = self.contributions[:, :levels]
         few = self.leaves[0] <= _MOST_LEAVES and self._few_rows(0)
         clear = _CLEAR_OF_FEW if few else _CLEAR
-        return ~_clearly_above_zero(contributions[:, -1:] - contributions, clear)
+        worse = _clearly_above_zero(contributions[:, -1:] - contributions, clear)
+        return ~worse & self._gives_up_mistakes[:levels]
+
+    @property
+    def _gives_up_mistakes(self) -> BoolArray:
+        """Whether what each level gives up looks like mistakes, or rows are many, shape (levels,).
+
+        Of rows of which a share q are mistakes, as many lie next to another one, which saves a leaf
+        on each side: each takes 2 (1 - q) leaves.
+        """
+        rows = int(self.shown.sum())
+        if rows >= _FEW_ROWS_PER_LEAF * self.leaves[0]:
+            return np.ones(len(self.leaves), dtype=bool)
+        exceptions = self.explanations - self.leaves
+        given_up = exceptions - exceptions[0]
+        of_mistakes = 2 * (1 - given_up / rows) * given_up
+        return np.asarray(self.leaves[0] - self.leaves >= _LIKE_MISTAKES * of_mistakes)
 
     def _few_rows(self, level: int) -> bool:
         return bool(self.shown.sum() < _LEAST_ROWS_PER_LEAF * self.leaves[level])
