@@ -254,24 +254,48 @@ def test_the_page_on_learning_names_the_limits() -> None:
 def test_the_page_on_inspecting_names_the_thresholds() -> None:
     page = text_of("inspect.md")
     for said in (
-        f"by more than {timing.FENCE:g} times the range between the quartiles, and than "
-        f"{timing.MANY_TIMES:g} times their median; told from {timing.FEWEST_INTERVALS} times on",
+        f"by more than {timing.FENCE:g} times the range between the quartiles",
+        f"more than {timing.MANY_TIMES:g} times their median",
+        f"takes at least {timing.FEWEST_INTERVALS} distances to tell",
         f"at least {idle.IDLE_SECONDS:g} s (`--idle SECONDS`) and {idle.IDLE_ROWS} rows in which",
         f"varies by more than {idle.STILL * 100:g} % of its",
-        f"of at least {duplicates.FEWEST_ROWS} rows that is as long as an earlier one "
-        f"(to {duplicates.LENGTH * 100:g} %",
+        f"of at least {duplicates.FEWEST_ROWS} rows that is nearly the same as an earlier one",
+        f"as long (to {duplicates.LENGTH * 100:g} %",
         f"alike in {duplicates.MOST_ROWS * 100:g} % of the rows",
         f"differs by more than {duplicates.ALIKE * 100:g} % of its",
         f"among more than {duplicates.MOST_DEMONSTRATIONS:,} demonstrations",
-        f"of at least {outliers.FEWEST} demonstrations",
+        f"among at least {outliers.FEWEST} demonstrations",
         f"modified z-score above {outliers.SCORE:g}",
-        f"by a factor of {outliers.FACTOR:g}, by {outliers.SHARE:g}, or by half",
+        f"| a factor of {outliers.FACTOR:g} |",
+        f"| the share of an action | {outliers.SHARE:g} |",
+        "| the median of a feature | half of its usual range |",
         f"by at least {outliers.OUTSIDE * 100:g} % of its usual range",
         f"{timing.MOST_LISTED} gaps, idle stretches and contradicting rows",
         f"{outliers.MOST_LISTED} outliers",
     ):
         assert said.casefold() in page.casefold()
     assert (outliers.RANGE, contradictions.MOST_LISTED) == (0.5, timing.MOST_LISTED)
+
+
+def test_the_sample_on_the_page_on_inspecting_is_what_the_command_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fleet").mkdir()
+    for name, going in (("a", 120), ("b", 140)):
+        lines = ["stamp,front,load,action"]
+        for row in range(200):
+            front, load, late = 3 - row / 100, row % 7, 2.9 * (row > 120)
+            if name == "b":
+                standing, undecided = row < 43, row in {138, 139, 140}
+                front = 2.0 if standing else 1.505 if undecided else front + 0.001
+                load, late = 3, 0.0
+            stamp = 1_700_000_000_000_000_000 + round((row / 10 + late) * 1e9)
+            lines.append(f"{stamp},{front},{load},{'go' if row < going else 'turn'}")
+        (tmp_path / "fleet" / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    references.main_of("inspect")(["fleet", "--no-cache"])
+    shown = (_DOCS / "inspect.md").read_text(encoding="utf-8").split("```")[3]
+    assert capsys.readouterr().out.splitlines() == shown.strip().splitlines()
 
 
 def test_no_page_has_what_a_conflict_leaves() -> None:
