@@ -1,4 +1,4 @@
-"""Channels that no demonstration has together, as where robots have namespaces of their own."""
+"""Channels that never occur in one demonstration, as with robots in separate namespaces."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from collections.abc import Iterator, Sequence
 
 from rebt_ros.demonstration.demonstration import Demonstration
 
-#: So many channels are named.
+#: Number of channels that a note names.
 _NAMED = 5
 
 
 def apart(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
-    """A note where each demonstration has a single channel, and not all have the same.
+    """A note if each demonstration has a single channel, and not all have the same one.
 
-    Channels decide side by side, each learned from its own rows alone: of one action that was
-    recorded by several names, none knows what was shown of the others.
+    Channels act side by side, each learned only from its own rows.  If one action was recorded
+    under several names, each of these channels knows only a part of what was shown.
 
     >>> list(apart([]))
     []
