@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.errors import listing
 
 #: Number of channels that a note names.
 _NAMED = 5
@@ -23,7 +24,7 @@ def apart(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
     names = sorted({channel for channels in alone for channel in channels})
     if not names[1:] or any(len(channels) != 1 for channels in alone):
         return
-    listed = ", ".join(map(repr, names[:_NAMED])) + (", …" if len(names) > _NAMED else "")
+    listed = listing([*map(repr, names)], _NAMED)
     yield (
         f"no demonstration has actions on two of {listed}: each is a channel of its own, which "
         "acts beside the others; where they are one by several names, as of robots in namespaces, "

@@ -20,7 +20,7 @@ from rebt_ros.demonstration.last_action import (
 )
 from rebt_ros.demonstration.schema import TRUTH, Feature, FeatureKind
 from rebt_ros.demonstration.weights import whole_weights
-from rebt_ros.errors import InputError, OptionError
+from rebt_ros.errors import InputError, OptionError, listing
 
 #: How many rows are checked before all of them are.
 _FIRST_ROWS = 1000
@@ -315,10 +315,6 @@ def _before(
     )
 
 
-def _shortened(names: Sequence[str]) -> str:
-    return ", ".join([*names[:_LISTED], *(["…"] if len(names) > _LISTED else [])])
-
-
 def _joined_states(
     demonstrations: Sequence[Demonstration],
 ) -> tuple[tuple[Feature, ...], FloatArray]:
@@ -330,8 +326,8 @@ def _joined_states(
             if not differing:
                 raise InputError(
                     f"{first.name} and {other.name} have the same features in different orders "
-                    f"({_shortened(mine)}; {_shortened(its)}): record them in one order, or learn "
-                    "from those of one order."
+                    f"({listing(mine, _LISTED)}; {listing(its, _LISTED)}): record them in one "
+                    "order, or learn from those of one order."
                 )
             raise InputError(
                 f"{first.name} and {other.name} have different features "

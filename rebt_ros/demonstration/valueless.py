@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.errors import listing
 
 #: Number of demonstrations that a note names.
 _NAMED = 3
@@ -32,7 +33,7 @@ def valueless(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
         if len(those) == len(demonstrations):
             where = "in any row"
         else:
-            named = ", ".join(those[:_NAMED]) + (", …" if len(those) > _NAMED else "")
+            named = listing(those, _NAMED)
             where = f"in {len(those)} of {len(demonstrations)} demonstrations ({named})"
         yield (
             f"feature {name!r} has no value {where}: see whether its path, kind and categories fit "

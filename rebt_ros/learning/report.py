@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,7 @@ from rebt_ros.demonstration.equal_states import codes_of_states
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import number_of
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import listing
 from rebt_ros.learning.judged_levels import JudgedLevels
 from rebt_ros.learning.sample_report import SampleReport
 
@@ -120,12 +121,12 @@ class LearningReport:
             recalls = [f"{recall:.1%} of {label!r}" for recall, label in sorted(judged)]
             said = (
                 f"Forecast: {self.agreement:.1%} agreement in cross-validation ({FORECAST}), where "
-                f"{simplest}; mean recall {self.mean_recall:.1%}: {_listed(recalls)}."
+                f"{simplest}; mean recall {self.mean_recall:.1%}: {listing(recalls, _LISTED)}."
             )
         if self.sample is not None:
             said = f"{self.sample.sentence} {said}"
         never = [repr(one.label) for one in self.actions if not one.taken]
-        return f"{said} Never taken: {_listed(never)}." if never else said
+        return f"{said} Never taken: {listing(never, _LISTED)}." if never else said
 
     def as_json(self) -> dict[str, Any]:
         """For summary.json."""
@@ -223,10 +224,6 @@ def _as_meant(label: str) -> str | float:
     text = unicodedata.normalize("NFKC", label).casefold().strip(_QUOTES)
     number = number_of(text)
     return _BETWEEN_WORDS.sub(" ", text) if number is None else number
-
-
-def _listed(words: Sequence[str]) -> str:
-    return ", ".join(words[:_LISTED]) + (", ..." if len(words) > _LISTED else "")
 
 
 def _share(value: float | None) -> str:

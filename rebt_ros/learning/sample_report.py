@@ -11,6 +11,7 @@ from rebt_ros.arrays import IntArray
 from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.demonstration.sampling import Sample
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import listing
 from rebt_ros.learning.evaluation import mean_recall
 
 #: Number of actions that a sentence lists.
@@ -44,9 +45,8 @@ class SampleReport:
     @property
     def sentence(self) -> str:
         """The report, for people."""
-        named = ", ".join(map(repr, self.complete[:_LISTED]))
-        more = ", ..." if len(self.complete) > _LISTED else ""
-        complete = f", all that show {named}{more} among them" if self.complete else ""
+        named = listing([*map(repr, self.complete)], _LISTED)
+        complete = f", all that show {named} among them" if self.complete else ""
         return (
             f"The tree was grown on a sample of {self.rows} of {self.of_rows} rows "
             f"({self.demonstrations} of {self.of_demonstrations} demonstrations{complete}), and "
