@@ -7,6 +7,7 @@ nodes turn a `RebtError` into text, an exit code or a failed service response.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 #: Longest message (characters), however long the names and values are that it mentions.
@@ -41,6 +42,15 @@ def _printable(character: str) -> str:
     if character.isprintable():
         return character
     return " " if character.isspace() else ascii(character)[1:-1]
+
+
+def listing(names: Sequence[object], most: int = 8) -> str:
+    """Names in a sentence: separated by commas, and cut off after so many.
+
+    >>> listing(["a", "b", "c"]), listing(["a", "b", "c"], most=2), listing([])
+    ('a, b, c', 'a, b, …', '')
+    """
+    return ", ".join([*map(str, names[:most]), *(["…"] if len(names) > most else [])])
 
 
 class InputError(RebtError):

@@ -13,7 +13,7 @@ from rclpy.serialization import serialize_message
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import BatteryState, JointState, Joy, LaserScan
-from std_msgs.msg import String
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String
 
 #: Some nanoseconds of 2024.
 BEGIN = 1_700_000_000_000_000_000
@@ -97,6 +97,19 @@ def twist(x: float, z: float) -> Twist:
     message = Twist()
     message.linear.x, message.angular.z = x, z
     return message
+
+
+def plain(fronts: Iterable[float]) -> list[tuple[int, str, Any]]:
+    """States of one number, `front`, each with an action: go up to 2, turn from there on."""
+    messages: list[tuple[int, str, Any]] = []
+    layout = MultiArrayLayout(dim=[MultiArrayDimension(label="front", size=1)])
+    for front in fronts:
+        stamp = BEGIN + 100 * MILLISECOND * len(messages)
+        state = Float64MultiArray(layout=layout, data=[front])
+        messages.append((stamp, "/state", state))
+        action = String(data="go" if front < 2 else "turn")
+        messages.append((stamp + MILLISECOND, "/action", action))
+    return messages
 
 
 def shown(rounds: int = 12) -> list[tuple[int, str, Any]]:

@@ -42,6 +42,35 @@ LAYERS: Final = (
 )
 DEPTH: Final = {unit: depth for depth, units in enumerate(LAYERS) for unit in units}
 
+#: The files and directories of the repository that git may track.
+TOP_LEVEL: Final = frozenset(
+    {
+        ".ci",
+        ".dockerignore",
+        ".editorconfig",
+        ".gitattributes",
+        ".gitignore",
+        ".ruff.toml",
+        "CHANGELOG.rst",
+        "CONTRIBUTING.md",
+        "Dockerfile",
+        "LICENSE",
+        "Makefile",
+        "QUALITY_DECLARATION.md",
+        "README.md",
+        "config",
+        "doc",
+        "docs",
+        "package.xml",
+        PACKAGE,
+        "resource",
+        "rosdoc2.yaml",
+        "setup.cfg",
+        "setup.py",
+        "test",
+    }
+)
+
 #: Top-level packages of ROS, and the modules that may know them.
 ROS: Final = frozenset(
     {
@@ -266,6 +295,31 @@ def test_a_library_is_imported_in_its_home_only(library: str) -> None:
         if name.split(".")[0] == library and not module.is_one_of(HOMES[library])
     ]
     assert strays == []
+
+
+def test_endpoints_of_the_executor_have_no_events() -> None:
+    homes = [
+        module.name
+        for module in MODULES
+        for node in ast.walk(module.tree)
+        if (isinstance(node, ast.keyword) and node.arg == "event_callbacks")
+        or (
+            module.name.startswith("rebt_ros.ros.executor.")
+            and isinstance(node, ast.Attribute)
+            and node.attr in {"create_publisher", "create_subscription"}
+        )
+    ]
+    assert set(homes) == {"rebt_ros.ros.quiet_events"}
+
+
+def test_the_top_level_holds_nothing_unexpected() -> None:
+    if not (CHECKOUT / ".git").exists():
+        pytest.skip("needs a git checkout")
+    listed = subprocess.run(
+        ["git", "-C", str(CHECKOUT), "ls-files", "-z"], capture_output=True, text=True, check=True
+    )
+    tracked = {name.split("/")[0] for name in listed.stdout.split("\0") if name}
+    assert tracked == TOP_LEVEL
 
 
 def test_no_data_is_run_as_code() -> None:

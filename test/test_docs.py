@@ -5,9 +5,10 @@ from __future__ import annotations
 import ast
 import contextlib
 import json
+import random
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -186,18 +187,103 @@ def test_the_page_on_the_paper_names_functions_that_name_their_lines() -> None:
         assert re.search(rf"\b[Ll]ines? {lines}\b", said), (lines, module, function)
 
 
-#: What no table can stand for, or what takes processes that other tests start.
-_ELSEWHERE = re.compile(
-    r"mcap|your_bag|--jobs|--scheduler|--robot|--attach|--label arm|--no-header|^trial|^describe"
-)
+#: What other tests run: with data from elsewhere, nodes, or a recording by its name.
+_ELSEWHERE = re.compile(r"--no-header|^experiment|^trial|--demonstration|SCHEDULER")
+
+#: An address in place of which commands get that of a cluster.
+_SCHEDULER = "tcp://10.0.0.1:8786"
+
+
+def _write(path: Path, header: str, rows: Iterable[str]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("\n".join([header, *rows]) + "\n")
+
+
+def _rows() -> Iterator[str]:
+    return (f"{x / 10},{'go' if x < 20 else 'turn'}" for x in range(40))
+
+
+def _data_of_many_bags() -> None:
+    """Tables in place of bags and recordings."""
+    names = ("my_bag/1", "demonstrations/1", *(f"fleet/{one}" for one in ("run_1", "run_7")))
+    for name in (*names, "fleet/run_9", "fleet/tuesday_1", "fleet/2026-11/run_1/1"):
+        _write(Path(f"{name}.csv"), "front,action", _rows())
+    Path("bad.txt").write_text("run_9.csv\n")
+    Path("good.txt").write_text("# comment\nfleet/run_1.csv\nfleet/run_7.csv\n")
+    # The names on the page are examples.
+    weights = code_of(_DOCS / "learning.md")
+    start = weights.index("demonstration,weight")
+    Path("weights.csv").write_text("\n".join(weights[start : start + 4]) + "\n")
+    _write(Path("fleet/expert_1.csv"), "front,action", _rows())
+
+
+def _data_of_the_readme() -> None:
+    """Bags, tables with several columns of actions, and what has routines."""
+    bags = pytest.importorskip("robot_bags")
+    messages = bags.plain(float(x) / 10 for x in range(40))
+    bags.write_bag(Path("my_bag"), messages)
+    bags.write_bag(Path("another"), messages)
+    next(Path("another").glob("*.mcap")).rename("another.mcap")
+    bags.write_bag(Path("your_bag"), bags.shown())
+    _write(Path("demonstrations/1.csv"), "front,action", _rows())
+    both = (
+        f"{row},{'up' if place % 7 > 3 else 'down'},{'turn' if place % 9 > 5 else 'go'}"
+        for place, row in enumerate(_rows())
+    )
+    _write(Path("table.csv"), "front,action,arm,base", both)
+    draw = random.Random(3)
+    for number in range(2):
+        fronts = (round(4 * draw.random(), 2) for _ in range(100))
+        each = ((x, ("lift", "grasp", "place") if x < 2 else ("go",)) for x in fronts)
+        rows = (f"{x},{action}" for x, actions in each for action in actions)
+        _write(Path(f"fleet/{number}.csv"), "front,action", rows)
+    Path("rules.yaml").write_text("rules:\n- {never: place, when: front > 3.5}\n")
+
+
+def _data_of_a_robot() -> None:
+    bags = pytest.importorskip("robot_bags")
+    for name in ("my_bag", "another_bag"):
+        bags.write_bag(Path(name), bags.shown())
+
+
+def _data_of_rules() -> None:
+    def action(front: float, battery: float, docked: int) -> str:
+        if docked and battery < 0.9:
+            return "charge"
+        return "go" if front > 0.5 else "turn_left"
+
+    draw = random.Random(1)
+    states = [(draw.random() * 2, draw.random(), draw.randrange(2)) for _ in range(200)]
+    rows = (f"{x:.3f},{x / 2:.3f},{b:.3f},{d},{action(x, b, d)}" for x, b, d in states)
+    _write(Path("demonstrations/1.csv"), "front,left,battery,docked,action", rows)
+    [rules] = re.findall(
+        r"```yaml\n(# rules.yaml\n.*?)```", (_DOCS / "rules.md").read_text("utf-8"), re.DOTALL
+    )
+    Path("rules.yaml").write_text(rules)
+
+
+def _exit_code(main: Callable[[list[str]], None], arguments: list[str]) -> object:
+    try:
+        main(arguments)
+    except SystemExit as ended:
+        return ended.code
+    return 0
 
 
 @pytest.mark.parametrize(
-    ("pages", "number"),
-    [("export.md groot2.md inspect.md", 6), ("scale.md", 3), ("../README.md", 9)],
+    ("pages", "prepare", "number"),
+    [
+        ("export.md groot2.md inspect.md learning.md", _data_of_many_bags, 7),
+        ("scale.md", _data_of_many_bags, 5),
+        ("../README.md", _data_of_the_readme, 15),
+        ("robot_file.md", _data_of_a_robot, 3),
+        ("rules.md trial.md", _data_of_rules, 5),
+        ("simulation.md", lambda: None, 3),
+    ],
 )
 def test_the_commands_on_a_page_work_as_printed(
     pages: str,
+    prepare: Callable[[], None],
     number: int,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -205,21 +291,26 @@ def test_the_commands_on_a_page_work_as_printed(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    # Any input does in place of a bag.
-    rows = "".join(f"{x / 10},{'go' if x < 20 else 'turn'}\n" for x in range(40))
-    fleet = [f"fleet/{name}.csv" for name in ("run_1", "run_7", "run_9", "tuesday_1")]
-    pattern = ["fleet/2026-11/run_1/1.csv"] if pages == "scale.md" else []
-    for name in ("table.csv", "my_bag/1.csv", "demonstrations/1.csv", *fleet, *pattern):
-        table = tmp_path / name
-        table.parent.mkdir(parents=True, exist_ok=True)
-        table.write_text(f"front,action\n{rows}")
-    (tmp_path / "rules.yaml").write_text("rules:\n- {never: turn, when: front < 0.5}\n")
-    (tmp_path / "bad.txt").write_text("run_9.csv\n")
-    ran = 0
+    prepare()
     lines = [line for page in pages.split() for line in command_lines(_DOCS / page)]
-    for name, arguments in lines:
-        if name in references.commands() and not _ELSEWHERE.search(shlex.join([name, *arguments])):
-            references.main_of(name)(arguments)
+    ran = 0
+    with contextlib.ExitStack() as stack:
+        for name, arguments in lines:
+            if name not in references.commands() or _ELSEWHERE.search(
+                shlex.join([name, *arguments])
+            ):
+                continue
+            if _SCHEDULER in arguments:
+                distributed = pytest.importorskip("distributed")
+                cluster = stack.enter_context(
+                    distributed.LocalCluster(
+                        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
+                    )
+                )
+                arguments[arguments.index(_SCHEDULER)] = cluster.scheduler_address
+            # A rule that is broken or unknown is what `check` is asked about.
+            code = _exit_code(references.main_of(name), arguments)
+            assert code == 0 or (name, code) == ("check", 1), (arguments, capsys.readouterr().err)
             ran += 1
     assert ran >= number
     assert "Traceback" not in capsys.readouterr().err
@@ -254,24 +345,48 @@ def test_the_page_on_learning_names_the_limits() -> None:
 def test_the_page_on_inspecting_names_the_thresholds() -> None:
     page = text_of("inspect.md")
     for said in (
-        f"by more than {timing.FENCE:g} times the range between the quartiles, and than "
-        f"{timing.MANY_TIMES:g} times their median; told from {timing.FEWEST_INTERVALS} times on",
+        f"by more than {timing.FENCE:g} times the range between the quartiles",
+        f"more than {timing.MANY_TIMES:g} times their median",
+        f"takes at least {timing.FEWEST_INTERVALS} distances to tell",
         f"at least {idle.IDLE_SECONDS:g} s (`--idle SECONDS`) and {idle.IDLE_ROWS} rows in which",
         f"varies by more than {idle.STILL * 100:g} % of its",
-        f"of at least {duplicates.FEWEST_ROWS} rows that is as long as an earlier one "
-        f"(to {duplicates.LENGTH * 100:g} %",
+        f"of at least {duplicates.FEWEST_ROWS} rows that is nearly the same as an earlier one",
+        f"as long (to {duplicates.LENGTH * 100:g} %",
         f"alike in {duplicates.MOST_ROWS * 100:g} % of the rows",
         f"differs by more than {duplicates.ALIKE * 100:g} % of its",
         f"among more than {duplicates.MOST_DEMONSTRATIONS:,} demonstrations",
-        f"of at least {outliers.FEWEST} demonstrations",
+        f"among at least {outliers.FEWEST} demonstrations",
         f"modified z-score above {outliers.SCORE:g}",
-        f"by a factor of {outliers.FACTOR:g}, by {outliers.SHARE:g}, or by half",
+        f"| a factor of {outliers.FACTOR:g} |",
+        f"| the share of an action | {outliers.SHARE:g} |",
+        "| the median of a feature | half of its usual range |",
         f"by at least {outliers.OUTSIDE * 100:g} % of its usual range",
         f"{timing.MOST_LISTED} gaps, idle stretches and contradicting rows",
         f"{outliers.MOST_LISTED} outliers",
     ):
         assert said.casefold() in page.casefold()
     assert (outliers.RANGE, contradictions.MOST_LISTED) == (0.5, timing.MOST_LISTED)
+
+
+def test_the_sample_on_the_page_on_inspecting_is_what_the_command_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fleet").mkdir()
+    for name, going in (("a", 120), ("b", 140)):
+        lines = ["stamp,front,load,action"]
+        for row in range(200):
+            front, load, late = 3 - row / 100, row % 7, 2.9 * (row > 120)
+            if name == "b":
+                standing, undecided = row < 43, row in {138, 139, 140}
+                front = 2.0 if standing else 1.505 if undecided else front + 0.001
+                load, late = 3, 0.0
+            stamp = 1_700_000_000_000_000_000 + round((row / 10 + late) * 1e9)
+            lines.append(f"{stamp},{front},{load},{'go' if row < going else 'turn'}")
+        (tmp_path / "fleet" / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    references.main_of("inspect")(["fleet", "--no-cache"])
+    shown = (_DOCS / "inspect.md").read_text(encoding="utf-8").split("```")[3]
+    assert capsys.readouterr().out.splitlines() == shown.strip().splitlines()
 
 
 def test_no_page_has_what_a_conflict_leaves() -> None:

@@ -1,11 +1,11 @@
 """Leaving out the conditions that no shown row needs.
 
-A decision tree parts the rows from the top, so that a rule repeats what was asked on the way to it:
-``charge`` while docked, with a low battery, *and with the target to the left*, because that was
-asked first and the robot was never shown docked otherwise.  Nothing that was shown speaks for the
+A decision tree splits the rows from the top, so a rule repeats all tests on the way to it:
+``charge`` while docked, with a low battery, *and with the target to the left*, because this was
+tested first and the robot was never shown docked otherwise.  Nothing that was shown supports the
 last condition.  Without it the rule does the same in every shown row, is shorter, and holds where
-it should.  This is the pruning of rules (Quinlan, 1987, "Simplifying decision trees"), of rules
-that stand in order of priority: each is reached only where all earlier ones failed.
+it should.  This is rule pruning (Quinlan, 1987, "Simplifying decision trees") for rules in priority
+order: each is reached only if all earlier ones failed.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ def without_needless_conditions(
 ) -> nodes.Node:
     """The tree without the conditions that none of the rows needs.
 
-    Every rule acts in the same rows as before.  In states that no row shows, a rule may take what a
-    later one took.
+    Every rule acts in the same rows as before.  In states that no row shows, a rule may replace a
+    later one.
 
     Args:
-        tree: Rules in order of priority, as `reduced_tree` makes them; another tree stays as it is.
-        table: The rows, whose history is that of the demonstrator.
+        tree: Rules in priority order, as `reduced_tree` makes them; other trees are unchanged.
+        table: The rows, with the history of the demonstrator.
         shown: Which of them count, shape (rows,); None for all.
     """
     if not isinstance(tree, nodes.Selector) or tree.memory:
         return tree
     cells = _Cells(tree, table, shown)
     rules = tree.children
-    # A shorter alternative can take over what another one was needed for.
+    # A shorter alternative can cover what another one was needed for.
     while (shorter := _shorter(rules, cells)) != rules:
         rules = shorter
     return nodes.Selector(rules)
 
 
 def _shorter(rules: tuple[nodes.Node, ...], cells: _Cells) -> tuple[nodes.Node, ...]:
-    """The rules, each without conditions that none of the cells that reach it needs."""
+    """The rules, each without the conditions that no cell reaching it needs."""
     left = cells.all
     found: list[nodes.Node] = []
     for place, rule in enumerate(rules):
@@ -55,19 +55,19 @@ def _shorter(rules: tuple[nodes.Node, ...], cells: _Cells) -> tuple[nodes.Node, 
                 map(_is_formula, conditions)
             ):
                 taken = left & cells.of_all(conditions)
-                # Nothing shows what a rule without rows needs.
+                # No row shows what a rule without rows needs.
                 needed = cells.needed_of_all(conditions, left) if taken else conditions
                 found.append(nodes.Sequence((*_flat(needed), acting)))
                 left &= ~taken
             case _:
-                # It takes all that is left, or more than can be told.
+                # It takes all remaining cells, or cannot be analyzed.
                 found.extend(rules[place:])
                 break
     return tuple(found)
 
 
 def _is_formula(node: nodes.Node) -> bool:
-    """Whether a node only tells where it succeeds, and acts nowhere."""
+    """Whether a node consists of conditions alone, without actions."""
     match node:
         case nodes.Condition():
             return True
@@ -78,10 +78,10 @@ def _is_formula(node: nodes.Node) -> bool:
 
 
 class _Cells:
-    """Rows that satisfy the same conditions, as one; sets of them are bits of an integer.
+    """Cells of rows that satisfy the same conditions; sets of cells are bits of an integer.
 
     Args:
-        tree: Whose conditions they are.
+        tree: The tree with these conditions.
         table: The rows.
         shown: Which of them count; None for all.
     """
@@ -105,7 +105,7 @@ class _Cells:
         """The set of all cells."""
 
     def of(self, node: nodes.Node) -> int:
-        """Where a formula succeeds."""
+        """The cells in which a formula succeeds."""
         match node:
             case nodes.Condition(literal=literal):
                 satisfied = self._satisfied[literal.condition]
@@ -118,7 +118,7 @@ class _Cells:
                 return self.of_all(nodes.children(node))
 
     def of_all(self, formulas: Sequence[nodes.Node]) -> int:
-        """Where all of some formulas succeed."""
+        """The cells in which all formulas succeed."""
         found = self.all
         for formula in formulas:
             found &= self.of(formula)
@@ -131,10 +131,10 @@ class _Cells:
         return found
 
     def needed_of_all(self, formulas: Sequence[nodes.Node], where: int) -> list[nodes.Node]:
-        """Those of some formulas that tell in which of some cells all of them succeed.
+        """The formulas of a conjunction that decide in which of the given cells it succeeds.
 
-        Comparisons of numbers are left out first: a threshold is one of many that could part the
-        same rows by chance.
+        Comparisons of numbers are left out first: one of many possible thresholds is likely to
+        separate the same rows by chance.
         """
         trial = sorted(range(len(formulas)), key=lambda place: not _compares(formulas[place]))
         return self._needed(formulas, trial, where, self.of)
@@ -146,13 +146,13 @@ class _Cells:
         where: int,
         succeeds: Callable[[nodes.Node], int],
     ) -> list[nodes.Node]:
-        """Those that decide in some of the cells, at least one of them, each shortened.
+        """The formulas that decide in the given cells, at least one, each simplified.
 
         Args:
-            formulas: A conjunction, of what `succeeds` says.
-            trial: The order in which they are left out if they can be.
+            formulas: A conjunction in terms of `succeeds`.
+            trial: The order in which to try to leave them out.
             where: The cells.
-            succeeds: In which cells a formula holds.
+            succeeds: Returns the cells in which a formula holds.
         """
         behind = [where] * (len(trial) + 1)
         for turn in range(len(trial) - 1, -1, -1):
@@ -168,12 +168,12 @@ class _Cells:
         return [kept[place] for place in sorted(kept)]
 
     def _shortened(self, formula: nodes.Node, where: int) -> nodes.Node:
-        """A formula that succeeds in the same ones of some cells."""
+        """A simpler formula that succeeds in the same of the given cells."""
         match formula:
             case nodes.Sequence(children=steps):
                 return sequence(_flat(self.needed_of_all(steps, where)))
             case nodes.Selector(children=alternatives):
-                # It fails where all of them fail.
+                # A Selector fails where all children fail.
                 needed = self._needed(
                     alternatives,
                     range(len(alternatives)),
@@ -190,7 +190,7 @@ class _Cells:
 
 
 def _flat(steps: Sequence[nodes.Node]) -> list[nodes.Node]:
-    """Steps of a Sequence, those of Sequences among them on their own."""
+    """The steps of a Sequence, with nested Sequences flattened."""
     return [
         step
         for one in steps
@@ -199,7 +199,7 @@ def _flat(steps: Sequence[nodes.Node]) -> list[nodes.Node]:
 
 
 def _limits(interval: Interval) -> tuple[Literal, Literal]:
-    """The two comparisons that an interval stands for."""
+    """The two comparisons of an interval."""
     return (
         Literal(Threshold(interval.quantity, interval.at_most)),
         Literal(Threshold(interval.quantity, interval.above), positive=False),
@@ -215,7 +215,7 @@ def _compares(formula: nodes.Node) -> bool:
 def _distinct(
     conditions: Sequence[Condition], table: DemonstrationTable, shown: BoolArray | None
 ) -> tuple[int, list[int]]:
-    """How many kinds of rows the conditions tell apart, and the set that satisfies each one."""
+    """The number of cells that the conditions distinguish, and the set that satisfies each."""
     kinds = np.empty((0, -(-len(conditions) // 8)), dtype=np.uint8)
     for rows in in_parts(len(table)):
         history = history_columns(table.actions, table.previous[rows], table.last[rows])

@@ -1,12 +1,12 @@
 """Beyond the paper: smaller trees with the same behavior.
 
 Infeasible combinations of conditions are don't-cares, factoring is repeated, the children of a
-Selector root stand in order of priority, and two thresholds are one interval.
+Selector root are in priority order, and two thresholds become one interval.
 
-Under the paper's root each rule must hold in exactly its own states.  Under a Selector a child is
-reached only where all earlier ones failed, so that it may do anything in the states that they
-take: these are don't-cares of its minimization.  The last child is reached only in its own states
-and needs no condition at all.  The result chooses what the decision tree predicts in every state.
+Under the paper's root, each rule must hold in exactly its own states.  Under a Selector, a child is
+reached only if all earlier ones failed, so the states that these take are don't-cares of its
+minimization.  The last child is reached only in its own states and needs no condition.  The result
+chooses what the decision tree predicts, in every state.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from rebt_ros.logic.minimize import cubes, minimized_cover
 from rebt_ros.paper.rule_trees import FactoredRule, rule_tree, with_root
 from rebt_ros.paper.rules import Rule
 
-#: Up to so many rules the best order is found, then the order that is best step by step; yet more
-#: rules are ordered by their number of leaves, as a search would take a minimization per pair.
+#: Up to this many rules, the best order is found; up to the second number, a greedy one; beyond it,
+#: rules are ordered by their number of leaves, since a search takes a minimization per pair.
 _MOST_RULES_IN_ANY_ORDER, _MOST_RULES_STEP_BY_STEP = 6, 16
 
-#: Nodes of any rule that has a condition: a Sequence of the condition and an action.
+#: Minimum number of nodes of a rule with a condition: a Sequence, the condition and an action.
 _LEAST_COST = 3
 
 
@@ -46,12 +46,12 @@ def reduced_tree(
     reductions: Reductions = ALL_REDUCTIONS,
     root: Root = Root.SELECTOR,
 ) -> nodes.Node:
-    """The rules as a tree, reduced as far as asked.
+    """The rules as a tree, with the requested reductions.
 
     Args:
-        rules: From `leaf_rules`: no two share a state, and together they cover all of them.
+        rules: From `leaf_rules`: no two share a state, and together they cover all states.
         reductions: What to do, as far as the tree's size allows (see `Reductions.made_in`);
-            priority is for Selectors only.
+            priority is only for Selectors.
         root: Kind of the root node.
     """
     leaves = sum(len(rule.dnf) for rule in rules)
@@ -102,19 +102,19 @@ def reduced_tree(
 
 
 def size_of(condition: FactoredCodes, actions: int, enclosing: Sequence[int] | None) -> int:
-    """Nodes of a rule's tree, which is not built to be counted.
+    """Number of nodes of a rule's tree, without building it.
 
     Args:
-        condition: Of the rule; float-reduced.
-        actions: How many it triggers.
-        enclosing: From `enclosing_literals`; None where thresholds do not become intervals.
+        condition: Condition of the rule; float-reduced.
+        actions: Number of actions that it triggers.
+        enclosing: From `enclosing_literals`; None if thresholds do not become intervals.
     """
     children, found = _extent(condition, enclosing)
     return _under_one(children + 1, found + actions + (actions > 1))
 
 
 def _extent(condition: FactoredCodes, enclosing: Sequence[int] | None) -> tuple[int, int]:
-    """The trees of a condition, and the nodes of all of them together."""
+    """Number of trees of a condition, and of their nodes in total."""
     children = len(condition.common)
     if enclosing is not None:
         children -= intervals_among(condition.common, enclosing)
@@ -127,14 +127,14 @@ def _extent(condition: FactoredCodes, enclosing: Sequence[int] | None) -> tuple[
 
 
 def _under_one(children: int, found: int) -> int:
-    """The nodes with the Sequence over them, which a single child does without."""
+    """The number of nodes with a Sequence over them, which a single child does not need."""
     return found if children == 1 else found + 1
 
 
 def _cheapest(
     left: Sequence[int], earlier: frozenset[int], cost: Callable[[int, frozenset[int]], int]
 ) -> int:
-    """The first of those that cost least."""
+    """The cheapest of the rules that are left; of equals, the first."""
     costs: dict[int, int] = {}
     for rule in left:
         costs[rule] = cost(rule, earlier)
@@ -153,11 +153,11 @@ def _child(
 
 
 def _best_order(rules: int, cost: Callable[[int, frozenset[int]], int]) -> tuple[int, ...]:
-    """The order with the lowest sum of costs, or a good one where there are many rules.
+    """The order with the lowest total cost, or a good one if there are many rules.
 
     Args:
         rules: Number of rules.
-        cost: Of a rule after the set of those that come before it.
+        cost: Cost of a rule after the set of those before it.
     """
     if rules > _MOST_RULES_IN_ANY_ORDER:
         order: tuple[int, ...] = ()
@@ -166,7 +166,7 @@ def _best_order(rules: int, cost: Callable[[int, frozenset[int]], int]) -> tuple
             left = [rule for rule in range(rules) if rule not in earlier]
             order = (*order, _cheapest(left, earlier, cost))
         return order
-    # What follows a set of rules does not depend on their order: dynamic programming over sets.
+    # The cost after a set of rules does not depend on their order: dynamic programming over sets.
     best: dict[frozenset[int], tuple[int, tuple[int, ...]]] = {frozenset(): (0, ())}
     for _ in range(rules):
         longer: dict[frozenset[int], tuple[int, tuple[int, ...]]] = {}
@@ -185,7 +185,7 @@ def _union(dnfs: Iterable[Dnf]) -> Dnf:
 
 
 def _meant_by(actions: tuple[str, ...], condition: Factored) -> Factored:
-    """The condition as it is meant in a rule for these actions."""
+    """The condition as a rule for these actions means it."""
     return Factored(
         tuple(deciding(literal, actions) for literal in condition.common),
         tuple(_meant_by(actions, alternative) for alternative in condition.alternatives),

@@ -1,7 +1,7 @@
 """Repeaters of single loops, beside the LAT trees of the paper.
 
-Algorithm 2 replaces one cycle after the other, which leaves one Repeater of each bundle of cycles,
-in which the simple ones are nested where nobody finds them.
+Algorithm 2 replaces one cycle after another.  Each bundle of cycles becomes one Repeater, in which
+the simple cycles are nested where nobody finds them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class LoopTrees:
     trees: tuple[LatTree, ...]
     """The best supported first."""
     left_out: int
-    """Loops beyond the number that was asked for."""
+    """Number of loops beyond the requested number."""
 
 
 def loop_trees(
@@ -36,14 +36,14 @@ def loop_trees(
     inv_set: frozenset[Literal] = frozenset(),
     most: int,
 ) -> LoopTrees:
-    """Makes a Repeater of each loop that is none of the LAT trees.
+    """Makes a Repeater of each loop that is not a LAT tree.
 
     Args:
         rules: Minimized and float-reduced, but unfactored.
-        trees: What Algorithm 2 made of them.
-        occurrences: In the demonstrations, given by their rows: loops of one action need all.
-        inv_set: Literals to be shown as Inverters (Algorithm 1, line 3).
-        most: How many Repeaters to build at most.
+        trees: The result of Algorithm 2 for these rules.
+        occurrences: The demonstrations, given by rows: loops of a single action need all rows.
+        inv_set: Literals to show as Inverters (Algorithm 1, line 3).
+        most: Maximum number of Repeaters.
     """
     rules, trees = tuple(rules), tuple(trees)
     if not most:
@@ -65,14 +65,14 @@ def loop_trees(
 def single_loops(
     graph: LatGraph, acyclic: Acyclic, trees: Iterable[LatTree], occurrences: Occurrences
 ) -> list[tuple[CycleNode, int]]:
-    """Loops that were shown and how often, the most frequent first, of equals the shortest.
+    """Loops that were shown, and how often; the most frequent first, of equals the shortest.
 
     - The simple cycles of the LAT graph: how often the demonstrations closed them.
-    - An action or PSA group that was done twice or more in a row: how often it was.  LAT is the
-      last *different* action, so that the graph has no edge for it, or at most, between the members
-      of a group, one from the group to itself.
-    - A path of actions that was done twice or more in a row: how often it was.  A rule that tells
-      by ``LAT != a`` when its action begins the path again has no edge for it either.
+    - An action or PSA group that was done twice or more in a row: how often.  LAT is the last
+      *different* action, so the graph has no edge for this, except from a group to itself between
+      members of the group.
+    - A path of actions that was done twice or more in a row: how often.  A rule that begins the
+      path again by ``LAT != a`` has no edge for this either.
     """
     loops = {one.cycle: one.times for one in acyclic.closed}
     for node in graph.nodes:

@@ -14,6 +14,7 @@ from rebt_ros.commands.shell import (
     print_notes,
     run,
 )
+from rebt_ros.errors import listing
 from rebt_ros.learning.replaying import Disagreement, Replay
 from rebt_ros.offline.replay_over_files import replay
 
@@ -78,7 +79,7 @@ def _print(result: Replay, most: int) -> None:
 
 def _on_foreign(result: Replay) -> str:
     labels = [repr(label) for label in result.foreign]
-    named = ", ".join(labels[:_NAMED]) + (", …" if len(labels) > _NAMED else "")
+    named = listing(labels, _NAMED)
     are = "are no actions" if labels[1:] else "is no action"
     rows = sum(result.foreign.values())
     return (

@@ -1,4 +1,4 @@
-"""Trees that were grown from some rows, with the rows of a whole table counted at their nodes."""
+"""Trees grown from some rows of a table, with all its rows counted at their nodes."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def fit_parts_by_sample(
     sample: BoolArray,
     options: FitOptions = PLAIN,
 ) -> list[FittedTree]:
-    """Fits trees as `fit_parts` does, with splits that are chosen by some rows alone.
+    """Fits trees as `fit_parts` does, but chooses splits by some of the rows.
 
     Args:
         table: All rows, which are counted.
         parts: Rows of each part, shape (rows,).
-        sample: The rows that splits are chosen by, shape (rows,), some of each part.
-        options: Of each fit.
+        sample: The rows that choose the splits, shape (rows,), some of each part.
+        options: Options of each fit.
 
     Returns:
         The tree of the table, then those of the parts.
@@ -39,12 +39,12 @@ def fit_parts_by_sample(
 def counted(
     trees: Sequence[FittedTree], table: DemonstrationTable, parts: Sequence[BoolArray]
 ) -> list[FittedTree]:
-    """The same trees as if they had been grown from other rows: what they are pruned by is new.
+    """The same trees, as if grown from other rows: they are pruned by the new counts.
 
-    The table is gone through once, for all trees, and is never encoded as a whole.
+    One pass over the table serves all trees, and never encodes it as a whole.
 
     Args:
-        trees: They may test the same.
+        trees: Trees with the same vocabulary.
         table: All rows, which count by their weights; each row has the LAT of the whole table.
         parts: The rows that count for each tree, shape (rows,); at least one.
     """

@@ -1,9 +1,9 @@
-"""How many bits it takes to say what was done: a decision tree, and the rows that it gets wrong.
+"""How many bits describe what was done: a decision tree, and the rows that it gets wrong.
 
-That is the minimum description length principle (Rissanen, 1978; Quinlan and Rivest, 1989, for
-decision trees).  Beside the size of an explanation (see `FittedTree.explanation`) it tells cheap
-tests from dear ones: a threshold is one of as many as there are rows, a category or a previous
-action is nothing but itself.
+This is the minimum description length principle (Rissanen, 1978; for decision trees, Quinlan and
+Rivest, 1989).  Unlike the size of an explanation (see `FittedTree.explanation`), it distinguishes
+cheap tests from expensive ones: a threshold is one of as many as there are rows, while a category
+or a previous action needs no number.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from rebt_ros.logic.conditions import Quantity, Threshold
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """The shortest description of the rows that a tree was fitted to, of all ways to prune it."""
+    """The shortest description of the rows that a tree was fitted to, over all ways to prune it."""
 
     bits: float
-    """Of the tree and its exceptions."""
+    """Bits of the tree and its exceptions."""
     exceptions: int
     """Rows that the tree gets wrong."""
     exception_bits: float
-    """What each of them takes."""
+    """Bits of each exception."""
 
 
 def shortest_description(fitted: FittedTree) -> Description:
-    """Describes the rows by a tree as pruned best for that.
+    """Describes the rows by a tree, pruned for the shortest description.
 
     Each node takes one bit that says whether it is a leaf.  A leaf names its action, an exception
-    its row and another action.  A split names its column; one that compares a number, also one of
-    the rows of its node, whose value is the threshold.
+    its row and another action.  A split names its column.  A split that compares a number also
+    names one of the rows of its node, whose value is the threshold.
     """
     grown = fitted.grown
     rows = np.maximum(grown.counts.sum(axis=1), 1)
@@ -56,20 +56,20 @@ def shortest_description(fitted: FittedTree) -> Description:
 
 
 def border_bits(tree: DecisionTree, table: DemonstrationTable) -> float:
-    """What it takes to say the numbers that a tree compares with.
+    """Bits of the numbers that a tree compares with.
 
-    Each is one of the multiples of its power of ten up to the largest absolute value in a table, as
-    10 of 0 and 10, and 9.3 of more than a hundred.  Beside the size of a tree that tells borders
-    that a person has in mind from such as only part the rows.
+    Each is a multiple of its power of ten, up to the largest absolute value in the table: 10 is one
+    of 0 and 10, and 9.3 is one of more than a hundred.  This distinguishes borders that a person
+    has in mind from borders that only happen to separate the rows.
 
     Args:
-        tree: With thresholds that are as round as they can be.
-        table: The rows that it parts.
+        tree: A tree with thresholds that are as round as possible.
+        table: The rows that it separates.
     """
     borders: dict[Quantity, set[float]] = {}
     for node in tree.walk():
         match node:
-            # Whatever the largest value is, 0 is the only multiple that is needed.
+            # Whatever the largest value, 0 is the only multiple needed.
             case Split(condition=Threshold(quantity=quantity, value=value)) if value:
                 borders.setdefault(quantity, set()).add(value)
     tests = StateTests(table.features)
@@ -82,5 +82,5 @@ def border_bits(tree: DecisionTree, table: DemonstrationTable) -> float:
 
 
 def _power_of_ten(value: float) -> float:
-    """The largest power of ten that a value other than 0 is a multiple of, as it is written."""
+    """The largest power of ten that a value other than 0, as written, is a multiple of."""
     return float(10.0 ** int(Decimal(repr(value)).normalize().as_tuple().exponent))

@@ -1,8 +1,8 @@
 """Which differences of two features a tree may test: ``left < right``, ``goal_x − x > 0.3``.
 
 A tree that compares one feature at a time needs many splits for what a difference says in one.
-But n features have n (n - 1) / 2 differences, most of which mean nothing.  Those are offered whose
-features are of one scale, and that a tree of some of the rows makes use of.
+But n features have n (n - 1) / 2 differences, most of which mean nothing.  A difference is offered
+if its features have the same scale, and if a tree of some of the rows makes use of it.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import Difference
 
-#: Percentiles between which a feature ranges, and how much the ranges of two may differ.
+#: Percentiles that bound a feature's range, and the factor by which two ranges may differ.
 _FROM, _TO, _MOST_RATIO = 5.0, 95.0, 2.0
-#: Rows of the tree that shows which differences are of use, evenly spread.
+#: Rows of the tree that shows which differences are useful, evenly spread.
 _MOST_ROWS = 1_000
-#: Differences are made of so many features, the first ones: this bounds the columns.
+#: Only this many features, the first ones, make differences; this bounds the columns.
 _MOST_FEATURES = 24
-#: How many differences are offered, and the least share that one must have in what a tree tells.
+#: Number of differences offered, and the minimum share of each in the impurity decrease.
 _MOST_DIFFERENCES, _LEAST_SHARE = 6, 0.02
 
 
@@ -40,9 +40,9 @@ def likely_differences(
 
     Args:
         table: At least one row.
-        vocabulary: What the tree may test beside them.
-        units: Of features, by their names; of different units there is no difference.
-        random_state: Decides between equally good splits.
+        vocabulary: What else the tree may test.
+        units: Units of features by name; features with different units make no difference.
+        random_state: Breaks ties between equally good splits.
 
     Returns:
         At most six, in the order of the features.
@@ -79,7 +79,7 @@ def _of_one_scale(table: DemonstrationTable, units: Mapping[str, str]) -> tuple[
 
 
 def _spread(column: FloatArray) -> float:
-    """From the 5th to the 95th percentile; 0 where nothing is known, or differences overflow."""
+    """From the 5th to the 95th percentile; 0 if nothing is known or differences overflow."""
     known = column[~np.isnan(column)]
     if not len(known) or np.abs(known).max() > LARGEST_VALUE / 2:
         return 0.0

@@ -1,10 +1,10 @@
-"""The table as the matrix that scikit-learn learns from, and back: what each column asks.
+"""The table as a matrix for scikit-learn, and what each of its columns asks.
 
 vocabulary
-    What a tree may test beside the features: combinations of several of them, and a history.
+    What a tree may test besides features: combinations of several features, and a history.
 
-A numeric feature is one column, a binary one and a combination as well; a categorical feature and
-the history have one column for each category and action (one-hot).
+A numeric or binary feature and a combination are one column each.  A categorical feature has one
+column for each category, and the history one for each action (one-hot).
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from rebt_ros.logic.conditions import (
     Threshold,
 )
 
-#: Stands for a missing number: larger than all that are not, as ``missing <= x`` is false.
+#: Stands for a missing number: larger than all others, since ``missing <= x`` is false.
 MISSING = float(np.finfo(np.float32).max)
-#: Combinations reach no farther, and stay on the same side of all thresholds.
+#: Limit for values of combinations, which stay on the same side of all thresholds.
 _FARTHEST = 0.3 * MISSING
 
 
 @dataclass(frozen=True, slots=True)
 class Vocabulary:
-    """What a decision tree may test beside the features."""
+    """What a decision tree may test besides features."""
 
     history: History = History.NONE
     combinations: tuple[Combination, ...] = ()
 
     def with_more(self, combinations: Iterable[Combination]) -> Vocabulary:
-        """The same with more combinations behind those that it has."""
+        """The vocabulary with more combinations after the existing ones."""
         return Vocabulary(self.history, (*self.combinations, *combinations))
 
 
@@ -61,14 +61,14 @@ class Number:
 
     def at_most(self, threshold: float) -> Literal:
         """The literal that holds where the column is at most `threshold`."""
-        # No value lies between the largest one that is accepted (1e38) and the missing ones.
+        # No value lies between the largest accepted one (1e38) and the missing ones.
         beyond = threshold > MISSING / 3
         return Literal(Threshold(self.quantity, KNOWN if beyond else exact_threshold(threshold)))
 
 
 @dataclass(frozen=True, slots=True)
 class Indicator:
-    """Column that is 1 where a condition holds and 0 elsewhere."""
+    """Column that is 1 where a condition holds, and 0 elsewhere."""
 
     condition: Condition
 
@@ -105,10 +105,10 @@ def encode(
 ) -> Float32Array:
     """The matrix to train on and predict from, shape (rows, columns), of all rows or a stretch.
 
-    Behind its rows there can be some to spare, which are zero.
+    Spare rows may follow its rows; they are zero.
 
-    Where there is nothing to learn from, it has one column that tells nothing, as scikit-learn
-    wants at least one.
+    Without anything to learn from, it has one constant column, because scikit-learn needs at least
+    one.
     """
     widths = [
         len(one.categories) if one.kind is FeatureKind.CATEGORICAL else 1 for one in table.features
@@ -116,7 +116,7 @@ def encode(
     history = history_of(table, vocabulary)
     width = sum(widths) + len(vocabulary.combinations)
     width += 0 if history is None else len(table.actions)
-    # Filled in place: large tables are held once.  Column by column, as trees are fitted.
+    # Filled in place, to hold large tables once, and by columns, in the order of fitting.
     states = table.states[rows]
     whole = np.zeros((len(states) + spare, max(width, 1)), dtype=np.float32, order="F")
     matrix = whole[: len(states)]
@@ -140,7 +140,7 @@ def encode(
 
 
 def history_of(table: DemonstrationTable, vocabulary: Vocabulary) -> IntArray | None:
-    """What was done before each row, as the vocabulary says it, shape (rows,)."""
+    """What was done before each row, in terms of the vocabulary, shape (rows,)."""
     match vocabulary.history:
         case History.NONE:
             return None
@@ -151,7 +151,7 @@ def history_of(table: DemonstrationTable, vocabulary: Vocabulary) -> IntArray | 
 
 
 def encode_history(matrix: Float32Array, history: IntArray, actions: int) -> None:
-    """Writes a history to a matrix that has one: positions of actions, shape (rows,)."""
+    """Writes a history to a matrix with one: positions of actions, shape (rows,)."""
     _one_hot(history, matrix[:, matrix.shape[1] - actions :])
 
 
@@ -170,8 +170,8 @@ def exact_threshold(threshold: float) -> float:
         if float(below) > threshold:
             below = np.nextafter(below, np.float32(-np.inf))
         above = np.nextafter(below, np.float32(np.inf))
-    # Both neighbours have 24 significant bits, so their middle is exact in double precision.
-    # Rounding takes a tie to the neighbour whose last bit is even.
+    # Both neighbors have 24 significant bits, so their middle is exact in double precision.
+    # A tie is rounded to the neighbor whose last bit is even.
     middle = (float(below) + float(above)) / 2
     tie_goes_down = int(below.view(np.uint32)) % 2 == 0
     return middle if tie_goes_down else float(np.nextafter(middle, -np.inf))

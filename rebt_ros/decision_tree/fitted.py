@@ -1,4 +1,4 @@
-"""Decision trees after they were grown: pruned to any level, run over tables, carried as data."""
+"""Fitted decision trees: pruned to any level, run over tables, and turned into plain data."""
 
 from __future__ import annotations
 
@@ -34,30 +34,30 @@ from rebt_ros.logic.conditions import (
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TrainedTree:
-    """A decision tree as data, beside the grown tree that it must equal."""
+    """A decision tree as data, with the grown tree that it must equal."""
 
     tree: DecisionTree
     vocabulary: Vocabulary
-    """What it may test beside the features."""
+    """What it may test besides features."""
     grown: GrownTree
     """Not pruned."""
     standing: IntArray
-    """The node that decides for each node as grown: itself, or what it is pruned to."""
+    """The node that decides for each grown node: itself, or what it is pruned to."""
     thresholds: FloatArray | None = None
-    """What each node compares with in double precision, shape (nodes,); None where thresholds are
-    those of the grown tree, in single precision."""
+    """What each node compares with in double precision, shape (nodes,); None for the thresholds of
+    the grown tree, in single precision."""
     notes: tuple[str, ...] = ()
     """What a person should know about the rows that it was fitted to; no full stops."""
 
     def predict(self, table: DemonstrationTable) -> IntArray:
-        """What it chooses, without going through `tree`: positions in ``table.actions``.
+        """What it chooses: positions in ``table.actions``, shape (rows,).
 
-        That is scikit-learn's own prediction, unless thresholds were moved.  Shape (rows,).
+        This is scikit-learn's own prediction, unless thresholds were moved.
         """
         return np.asarray(self.grown.majority[self.leaves(table)])
 
     def deciding(self, table: DemonstrationTable) -> tuple[tuple[Leaf, ...], IntArray]:
-        """The leaves that decide for the rows, and the position of each row's one among them."""
+        """The leaves that decide for the rows, and the position among them for each row."""
         nodes, position = np.unique(self.leaves(table), return_inverse=True)
         counts = self.grown.counts[nodes].tolist()
         return tuple(Leaf(tuple(rows)) for rows in counts), position
@@ -73,7 +73,7 @@ class TrainedTree:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedTree:
-    """One fit with all its pruning levels."""
+    """A fit with all its pruning levels."""
 
     grown: GrownTree
     path: PruningPath
@@ -81,7 +81,7 @@ class FittedTree:
     asked: tuple[Number | Indicator, ...]
     """What each column of the encoded table asks."""
     vocabulary: Vocabulary
-    """What it may test beside the features."""
+    """What it may test besides features."""
     max_depth: int | None
     random_state: int
     notes: tuple[str, ...] = ()
@@ -89,55 +89,55 @@ class FittedTree:
 
     @property
     def leaves(self) -> int:
-        """Leaves of the tree before it is pruned."""
+        """Leaves of the unpruned tree."""
         return int(np.count_nonzero(self.grown.left < 0))
 
     @property
     def comparisons(self) -> int:
-        """Splits before it is pruned that compare a number, instead of asking yes or no."""
+        """Splits of the unpruned tree that compare a number, instead of asking yes or no."""
         split = self.grown.column[self.grown.left >= 0].tolist()
         return sum(isinstance(self.asked[column], Number) for column in split)
 
     @property
     def explanation(self) -> int:
-        """How much it takes to explain the rows that it was fitted to: leaves and exceptions.
+        """The size of the explanation of the rows that it was fitted to: leaves and exceptions.
 
-        Exceptions are the rows that a tree gets wrong.  Of all ways to prune this one it is the
-        least number, so that what demonstrators do by mistake counts as that.
+        Exceptions are the rows that a tree gets wrong.  The number is the minimum over all ways to
+        prune this tree, so mistakes of demonstrators count as exceptions.
         """
         return self._explaining()[0]
 
     def explained(self, table: DemonstrationTable) -> IntArray:
         """What the tree of the explanation chooses in each row of a table, shape (rows,).
 
-        Of equally small explanations it is the one with the fewest leaves.
+        Of equally small explanations, the one with the fewest leaves counts.
         """
         return np.asarray(self.grown.majority[self.standing_explained[self.reached(table)]])
 
     @property
     def explaining_leaves(self) -> int:
-        """Leaves of the tree of the explanation; the other part of its size are exceptions."""
+        """Leaves of the tree of the explanation; the rest of its size are exceptions."""
         return len(np.unique(self.standing_explained[self.grown.left < 0]))
 
     @property
     def standing_explained(self) -> IntArray:
-        """For each node as grown, the one that decides in the tree of the explanation: (nodes,)."""
+        """The deciding node of each grown node in the tree of the explanation, shape (nodes,)."""
         return self.path.standing(self._explaining()[1])
 
     @property
     def gains(self) -> FloatArray:
-        """How much impurity the splits by each column take away, shape (columns,)."""
+        """Impurity decrease by the splits of each column, shape (columns,)."""
         grown = self.grown
         split = np.flatnonzero(grown.left >= 0)
         gains = grown.risk[split] - grown.risk[grown.left[split]] - grown.risk[grown.right[split]]
         return np.bincount(grown.column[split], gains, len(self.asked)).astype(np.float64)
 
     def reached(self, table: DemonstrationTable) -> IntArray:
-        """The leaf as grown that each row reaches, shape (rows,)."""
+        """The grown leaf that each row reaches, shape (rows,)."""
         return _reached(self.grown, table, self.vocabulary)
 
     def _explaining(self) -> tuple[int, BoolArray]:
-        """The size of the explanation, and which nodes are its leaves, or would be if reached."""
+        """The size of the explanation, and the nodes that are (or would be) its leaves."""
         sizes = self._sizes()
         least, is_leaf = self.grown.cheapest(sizes, np.zeros_like(sizes))
         return int(least), is_leaf
@@ -148,12 +148,12 @@ class FittedTree:
         return self.path.sums(self._sizes())
 
     def _sizes(self) -> IntArray:
-        """What each node adds to an explanation where it is a leaf, shape (nodes,)."""
+        """What each node adds to an explanation if it is a leaf, shape (nodes,)."""
         counts = self.grown.counts
         return np.asarray(1 + counts.sum(axis=1) - counts.max(axis=1))
 
     def right(self, table: DemonstrationTable) -> int:
-        """How many rows the tree predicts before it is pruned."""
+        """How many rows the unpruned tree predicts."""
         return int(self.hits(table, np.zeros(1)).sum())
 
     def path_lengths(self, table: DemonstrationTable) -> IntArray:
@@ -170,10 +170,10 @@ class FittedTree:
         return self._trained(is_leaf, None)
 
     def readable_at(self, ccp_alpha: float, table: DemonstrationTable) -> TrainedTree:
-        """The tree as pruned at `ccp_alpha`, with thresholds that are round and shared.
+        """The tree as pruned at `ccp_alpha`, with round and shared thresholds.
 
-        Each threshold lies in the gap between the rows of its node, so that no row of the table
-        reaches another leaf.
+        Each threshold lies in the gap between the rows of its node, so every row of the table
+        reaches the same leaf.
 
         Args:
             ccp_alpha: The pruning level.
@@ -182,7 +182,7 @@ class FittedTree:
         return self._readable(self.path.leaves_at(ccp_alpha), table)
 
     def readable_explained(self, table: DemonstrationTable) -> TrainedTree:
-        """The tree of the explanation, with thresholds that are round and shared.
+        """The tree of the explanation, with round and shared thresholds.
 
         Args:
             table: What the tree was fitted to, without made-up rows.
@@ -214,7 +214,7 @@ class FittedTree:
         )
 
     def _exact_thresholds(self) -> FloatArray:
-        """What the nodes compare with in double precision, deciding as scikit-learn does."""
+        """Thresholds in double precision that decide as scikit-learn does."""
         grown = self.grown
         thresholds = grown.threshold.copy()
         for node in np.flatnonzero(grown.left >= 0).tolist():
@@ -224,11 +224,11 @@ class FittedTree:
         return thresholds
 
     def hits(self, table: DemonstrationTable, ccp_alphas: FloatArray) -> IntArray:
-        """How many of a table's rows of each action each pruning level predicts, by their weights.
+        """The weighted number of a table's rows of each action that each pruning level predicts.
 
-        A node decides at the levels from its own ``collapse`` up to its parent's.  So the rows that
-        a level predicts are those that reach its deciding nodes with their majority action, and
-        one pass over the nodes counts them for all levels.
+        A node decides at the levels from its own ``collapse`` up to its parent's.  A level predicts
+        the rows that reach its deciding nodes and have their majority action.  So one pass over
+        the nodes counts them for all levels.
 
         Args:
             table: At least one row, with the actions that the tree was fitted to.
@@ -252,7 +252,7 @@ class FittedTree:
 
 
 def _reached(grown: GrownTree, table: DemonstrationTable, vocabulary: Vocabulary) -> IntArray:
-    """The leaf as grown that each row reaches, shape (rows,)."""
+    """The grown leaf that each row reaches, shape (rows,)."""
     reached = np.empty(len(table), dtype=np.int64)
     for rows in in_parts(len(table)):
         reached[rows] = grown.apply(encode(table, vocabulary, rows))
@@ -288,8 +288,8 @@ def _gaps(
     """The largest known value that goes left at each split, and the smallest that goes right.
 
     Returns:
-        Two of shape (nodes,): -inf and inf where there is none.  The largest absolute value of each
-        column that is compared.
+        Two arrays of shape (nodes,), with -inf and inf for none, and the largest absolute value of
+        each column that is compared.
     """
     low, high = np.full(len(grown), -np.inf), np.full(len(grown), np.inf)
     largest: dict[int, float] = {}
@@ -310,7 +310,7 @@ def _gaps(
 
 
 class _Values:
-    """What a tree's columns hold in some rows, as doubles; infinite where it is missing."""
+    """Values of a tree's columns in some rows, as doubles; missing values are infinite."""
 
     def __init__(
         self, grown: GrownTree, table: DemonstrationTable, vocabulary: Vocabulary, rows: slice
@@ -337,7 +337,7 @@ class _Values:
 
 
 def _asked(asked: Number | Indicator, table: DemonstrationTable, rows: slice) -> FloatArray:
-    """What a column asks of some rows, in double precision: a number, or 1 for yes; (rows,)."""
+    """The answer of some rows to a column, in double precision: a number, or 1 for yes; (rows,)."""
     states = table.states[rows].T
     if isinstance(asked, Number):
         return StateTests(table.features).reading(asked.quantity)(states)

@@ -1,4 +1,4 @@
-"""Decision trees as they were grown: arrays over their nodes."""
+"""Grown decision trees: arrays over their nodes."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ class GrownTree:
     """The nodes of a binary tree, each before its children; the root comes first."""
 
     left: IntArray
-    """Where a row goes whose value is at most the threshold, shape (nodes,); -1 at leaves."""
+    """Child for values up to the threshold, shape (nodes,); -1 at leaves."""
     right: IntArray
-    """Where it goes otherwise, shape (nodes,); -1 at leaves."""
+    """Child for larger values, shape (nodes,); -1 at leaves."""
     column: IntArray
-    """What is compared, shape (nodes,); of no meaning at leaves."""
+    """Column that is compared, shape (nodes,); meaningless at leaves."""
     threshold: FloatArray
-    """With what, shape (nodes,); of no meaning at leaves."""
+    """Threshold, shape (nodes,); meaningless at leaves."""
     counts: IntArray
-    """Rows of each action that it was grown from, by their weights, shape (nodes, actions)."""
+    """Weighted number of training rows of each action, shape (nodes, actions)."""
     risk: FloatArray
-    """Impurity times the share of the rows, shape (nodes,)."""
+    """Impurity times the share of rows, shape (nodes,)."""
     engine: Callable[[Float32Array], IntArray] | None = None
-    """What does the same as `apply`, but faster; None where there is nothing."""
+    """A faster equivalent of `apply`; None if there is none."""
 
     def __len__(self) -> int:
         return len(self.left)
 
     @property
     def majority(self) -> IntArray:
-        """The most frequent action of each node, of equals the first, shape (nodes,)."""
+        """The most frequent action of each node (the first of equals), shape (nodes,)."""
         return np.asarray(np.argmax(self.counts, axis=1))
 
     def cheapest(
         self, leaf: FloatArray | IntArray, split: FloatArray | IntArray
     ) -> tuple[float, BoolArray]:
-        """The tree pruned so that it costs least; of equals, the one with the fewest leaves.
+        """The cheapest pruned tree; of equals, the one with the fewest leaves.
 
         Args:
-            leaf: What each node costs where it is a leaf, shape (nodes,).
-            split: What it costs where it is none, beside its children, shape (nodes,).
+            leaf: Cost of each node as a leaf, shape (nodes,).
+            split: Cost of each node as a split, without its children, shape (nodes,).
 
         Returns:
-            The costs, and which nodes are leaves, or would be if reached, shape (nodes,).
+            The costs, and the nodes that are leaves, or would be if reached, both (nodes,).
         """
         costs, parting = leaf.tolist(), split.tolist()
         left, other = self.left.tolist(), self.right.tolist()

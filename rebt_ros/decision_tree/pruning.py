@@ -1,11 +1,10 @@
 """Minimal cost-complexity pruning (Breiman et al., 1984): all levels of one fitted tree.
 
 pruning level
-    One tree of the nested sequence that weakest-link pruning goes through, from the fitted tree to
-    its root alone.
+    One tree of the nested sequence of weakest-link pruning, from the fitted tree to its root alone.
 
-scikit-learn gives such a tree by a fit of its own for each ``ccp_alpha``.  The levels of one
-fitted tree are the same trees, found in one pass.
+scikit-learn fits such a tree again for each ``ccp_alpha``.  The levels of one fitted tree are the
+same trees, found in one pass.
 """
 
 from __future__ import annotations
@@ -25,12 +24,12 @@ _NONE = -1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PruningPath:
-    """At which ``ccp_alpha`` each split of a fitted tree is pruned."""
+    """The ``ccp_alpha`` at which each split of a fitted tree is pruned."""
 
     alphas: FloatArray
-    """One ``ccp_alpha`` per level, ascending; the first is 0 and leaves the tree as it is."""
+    """The ``ccp_alpha`` of each level, ascending; the first is 0 and prunes nothing."""
     collapse: FloatArray
-    """Least ``ccp_alpha`` at which a node is a leaf, shape (nodes,); -inf for leaves of the
+    """The smallest ``ccp_alpha`` at which a node is a leaf, shape (nodes,); -inf for leaves of the
     fitted tree.  It rises from each node to its parent."""
     parents: IntArray
     """Parent of each node, -1 for the root, shape (nodes,)."""
@@ -40,18 +39,18 @@ class PruningPath:
 
     @property
     def middles(self) -> FloatArray:
-        """Geometric middle between each ``ccp_alpha`` and the next one; the last stays."""
+        """Geometric mean of each ``ccp_alpha`` and the next one; the last one as it is."""
         following = np.append(self.alphas[1:], self.alphas[-1])
         return np.asarray(np.sqrt(self.alphas * following))
 
     def middle(self, ccp_alpha: float) -> float:
-        """The middle of the range of the level that a ``ccp_alpha`` comes to."""
+        """The middle of the range of the level that a ``ccp_alpha`` belongs to."""
         level = np.searchsorted(self.alphas, ccp_alpha, side="right") - 1
         return float(self.middles[level])
 
     def leaves_at(self, ccp_alpha: float) -> BoolArray:
         """Which nodes are leaves, or below a leaf, at this level, shape (nodes,)."""
-        # As in scikit-learn, 0 means not to prune, also where that would cost nothing.
+        # As in scikit-learn, 0 prunes nothing, not even at no cost.
         return np.less_equal(self.collapse, ccp_alpha if ccp_alpha > 0 else -np.inf)
 
     def leaf_counts(self) -> IntArray:
@@ -62,7 +61,7 @@ class PruningPath:
         """The sum over the leaves of the tree at each level, shape (levels,).
 
         Args:
-            of_nodes: What each node adds where it is a leaf, shape (nodes,).
+            of_nodes: What each node adds as a leaf, shape (nodes,).
         """
         first, end = self.levels_decided(self.alphas)
         change = np.zeros(len(self) + 1, dtype=np.int64)
@@ -77,15 +76,15 @@ class PruningPath:
             ccp_alphas: The levels, ascending, shape (levels,).
 
         Returns:
-            Positions of levels, or their number where there is none, both of shape (nodes,).
+            Positions of levels, or their number if there is none, both of shape (nodes,).
         """
-        # 0 does not prune, also not what could be pruned at no cost.
+        # 0 prunes nothing, not even at no cost.
         levels = np.where(ccp_alphas > 0, ccp_alphas, -np.inf)
         first = np.searchsorted(levels, self.collapse, side="left")
         return first, np.where(self.parents < 0, len(levels), first[self.parents])
 
     def passed(self, reached: IntArray) -> IntArray:
-        """The rows that pass through each node, where so many end at it: (nodes, actions)."""
+        """Rows that pass through each node, given those that end at it, shape (nodes, actions)."""
         passed = reached.copy()
         # Rows that reach a node reach its parent; parents come before their children.
         for node in range(len(passed) - 1, 0, -1):
@@ -93,7 +92,7 @@ class PruningPath:
         return passed
 
     def standing(self, is_leaf: BoolArray) -> IntArray:
-        """For each node, itself or the topmost of the given leaves above it, shape (nodes,)."""
+        """Each node, or the topmost of the given leaves above it, shape (nodes,)."""
         standing = np.arange(len(is_leaf))
         # Parents come before their children.
         for node in range(1, len(is_leaf)):
@@ -104,11 +103,11 @@ class PruningPath:
 
 
 def pruning_path(grown: GrownTree) -> PruningPath:
-    """Prunes the weakest link again and again, as scikit-learn does, and notes when.
+    """Prunes the weakest link repeatedly, as scikit-learn does, and notes each ``ccp_alpha``.
 
-    A link's weakness is the effective alpha of its node t: how much the impurity of t alone
-    exceeds that of its branch, for each leaf that pruning would save.  Takes O(n · depth · log n)
-    steps for n nodes.
+    The weakness of a link is the effective alpha of its node t: how much the impurity of t alone
+    exceeds that of its branch, per leaf saved by pruning.  Takes O(n · depth · log n) steps for n
+    nodes.
     """
     parents = _parents(grown.left, grown.right)
     is_leaf = grown.left == _NONE
@@ -121,9 +120,9 @@ def pruning_path(grown: GrownTree) -> PruningPath:
 
 
 class _Links:
-    """The splits that are left while links are pruned.
+    """The remaining splits while links are pruned.
 
-    Lists, as single numbers are looked up and changed much faster in them than in arrays.
+    Its data are lists: reading and changing single numbers is much faster there than in arrays.
     """
 
     def __init__(self, grown: GrownTree, parents: IntArray) -> None:
@@ -141,7 +140,7 @@ class _Links:
                 self._leaves[node] += 1
 
     def weakest_first(self) -> Iterator[tuple[int, float]]:
-        """Each split, and the ``ccp_alpha`` at which it is pruned; that never falls."""
+        """Each split, and the ``ccp_alpha`` at which it is pruned, which never falls."""
         newest = {
             node: self._alpha(node) for node, is_split in enumerate(self._is_split) if is_split
         }
@@ -152,7 +151,7 @@ class _Links:
             alpha, node = heapq.heappop(weakest)
             if newest.get(node) != alpha:
                 continue
-            # Rounding can make a later link a little weaker than an earlier one, or than nothing.
+            # Rounding can make a later link slightly weaker than an earlier one, or than 0.
             reached = max(reached, alpha)
             for below in self._cut(node):
                 del newest[below]
@@ -171,7 +170,7 @@ class _Links:
         return (self._risk[node] - self._branch_risk[node]) / (self._leaves[node] - 1)
 
     def _cut(self, node: int) -> list[int]:
-        """Makes a leaf of a split; it and the splits below it, which are none any longer."""
+        """Turns a split into a leaf; yields it and the splits below it, which are gone."""
         found, waiting = [], [node]
         while waiting:
             one = waiting.pop()

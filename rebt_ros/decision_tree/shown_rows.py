@@ -16,25 +16,24 @@ from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 
-#: Ranges that a channel may have, over all leaves and features: bounds the size of documents.
+#: Maximum number of ranges of a channel, over all leaves and features; bounds documents.
 _MOST_RANGES = 10_000
 
 
 def shown_rows(table: DemonstrationTable, trained: TrainedTree) -> ShownChannel:
     """The ranges of the features in the rows of each leaf.
 
-    Where there are more leaves than a document should hold, leaves that stand side by side in the
-    tree share their ranges: what was shown is then told from what was not less sharply.
+    If there are more leaves than a document should hold, leaves next to each other share their
+    ranges.  These then separate shown from unknown states less sharply.
 
     Args:
-        table: The rows that the tree was learned from; those made up for rare actions were not
-            shown.
+        table: The rows that the tree was learned from, without rows made up for rare actions.
         trained: The tree.
     """
     compared = sum(not feature.lag for feature in table.features)
     most = min(MOST_SHOWN_LEAVES, max(_MOST_RANGES // max(compared, 1), 1))
     leaf_of_row = trained.leaves(table)
-    # scikit-learn numbers nodes from left to right, so that neighbours have neighbouring numbers.
+    # scikit-learn numbers nodes from left to right, so neighbors have adjacent numbers.
     reached = np.bincount(leaf_of_row, minlength=len(trained.grown))
     leaves = np.flatnonzero(reached)
     group_of_leaf = np.zeros(len(reached), dtype=np.int64)
@@ -59,17 +58,17 @@ def shown_rows(table: DemonstrationTable, trained: TrainedTree) -> ShownChannel:
 
 
 def _groups(leaves: int, most: int) -> IntArray:
-    """The group of each leaf: itself, or one of `most` groups of about equally many."""
+    """The group of each leaf: itself, or one of `most` groups of about equal size."""
     count = min(leaves, most)
     return np.arange(leaves) * count // max(leaves, 1)
 
 
 class _Values:
-    """What a feature was in the rows of each group, gathered from one part of a table to the next.
+    """The values of a feature in the rows of each group, gathered part by part of a table.
 
     Args:
         feature: The feature.
-        groups: How many there are.
+        groups: Number of groups.
     """
 
     def __init__(self, feature: Feature, groups: int) -> None:
@@ -78,11 +77,11 @@ class _Values:
         self._occurs = np.zeros((groups, len(feature.categories)), dtype=bool)
 
     def add(self, column: FloatArray, groups: IntArray, starts: IntArray) -> None:
-        """Takes the values of some rows.
+        """Adds the values of some rows.
 
         Args:
-            column: Group after group, shape (rows,).
-            groups: Those that have rows.
+            column: Values, one group after another, shape (rows,).
+            groups: The groups that have rows.
             starts: Where each of them begins.
         """
         if self._feature.lag:
@@ -92,12 +91,12 @@ class _Values:
             known = ~np.isnan(column)
             self._occurs[of_row[known], column[known].astype(np.int64)] = True
             return
-        # These leave out what is missing, unless all is.
+        # These ignore missing values, unless all are missing.
         self._low[groups] = np.fmin(self._low[groups], np.fmin.reduceat(column, starts))
         self._high[groups] = np.fmax(self._high[groups], np.fmax.reduceat(column, starts))
 
     def shown(self) -> list[ShownValues]:
-        """What there was, group by group."""
+        """What was shown, group by group."""
         if self._feature.lag:
             return [None] * len(self._low)
         if self._feature.kind is FeatureKind.CATEGORICAL:

@@ -1,15 +1,15 @@
-"""Upsampling: rows made up for rare actions, for a decision tree to be fitted to and nothing else.
+"""Upsampling: rows made up for rare actions, only for fitting decision trees.
 
-SVM-SMOTE (Nguyen et al., 2011) makes rows of an action from the rows where it borders on others and
-their neighbours of the same action, until it has about as many rows as the most frequent action.
+SVM-SMOTE (Nguyen et al., 2011) makes rows of an action from its rows that border on other actions,
+and their neighbors of the same action, until it has about as many as the most frequent action.
 Four things differ from plain SVM-SMOTE on an encoded table:
 
-* Each column is scaled to its range first, so that no unit of measurement decides what is near.
-* A made-up row takes its truth value, its category and its LAT from the nearer of its two sources
-  instead of a fraction of both, and its numbers lie within the range that was shown.
-* Rows that lack a number are not used as sources: there is nothing between a number and none.
-* An action that cannot be upsampled (too few rows, or none that borders on its own kind) stays as
-  it is, and is named.
+* Each column is scaled to its range first, so units of measurement do not decide what is near.
+* A made-up row takes truth values, categories and LAT from the nearer of its two sources, instead
+  of a fraction of both.  Its numbers lie within the range that was shown.
+* Rows with a missing number are not used as sources: nothing lies between a number and none.
+* An action that cannot be upsampled (too few rows, or none with a neighbor of its kind) stays as it
+  is, and is named.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from rebt_ros.decision_tree.encoding import MISSING, Indicator, Number
 from rebt_ros.errors import OptionError
 from rebt_ros.logic.conditions import Condition, LastActionIs, PreviousActionIs, features_of
 
-#: Neighbours of the same action that a row is made up with, and of any action that say whether a
-#: row is noise; fewer where there are fewer rows (SVM-SMOTE's defaults).
+#: Neighbors of the same action that a row is made up with, and of any action that decide whether a
+#: row is noise; fewer if there are fewer rows (SVM-SMOTE's defaults).
 _NEIGHBOURS, _SURROUNDINGS = 5, 10
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Upsampled:
-    """The rows that were shown, followed by those made up."""
+    """The shown rows, followed by the made-up ones."""
 
     matrix: Float32Array
     """Shape (rows, columns)."""
@@ -49,7 +49,7 @@ def svm_smote(
     asked: Sequence[Number | Indicator],
     random_state: int,
 ) -> Upsampled:
-    """Adds rows, up to as many as the most frequent action has for all actions.
+    """Adds rows, until each action has about as many as the most frequent one.
 
     Args:
         matrix: An encoded table, shape (rows, columns), at least one row.
@@ -63,7 +63,7 @@ def svm_smote(
     sampler = _sampler()
     actions, counts = np.unique(chosen, return_counts=True)
     missing = matrix == MISSING
-    # A number that no row has tells nothing, and must not rule out all rows.
+    # A column without any number says nothing, and must not exclude all rows.
     used = np.flatnonzero(~missing.all(axis=0))
     sources = ~missing[:, used].any(axis=1)
     scale = _Scale.of(matrix[np.ix_(sources, used)])
@@ -103,7 +103,7 @@ class _Scale:
         return cls((rows - low) / np.where(span == 0, 1, span), low, span)
 
     def back(self, scaled: FloatArray) -> Float32Array:
-        """SVM-SMOTE also goes beyond the rows that it has, which is cut off here."""
+        """The inverse scaling, clipped: SVM-SMOTE also extrapolates beyond its rows."""
         return (self.low + np.clip(scaled, 0, 1) * self.span).astype(np.float32)
 
 
@@ -119,7 +119,7 @@ def _sampler() -> Callable[..., Any]:
         reason = " ".join(str(err).split()).rstrip(".")
         raise OptionError(
             f"upsampling needs imbalanced-learn, which cannot be imported ({reason}): install a "
-            "version that goes with your scikit-learn, or learn without upsampling."
+            "version that fits your scikit-learn, or learn without upsampling."
         ) from err
     return SVMSMOTE  # type: ignore[no-any-return]
 
@@ -132,7 +132,7 @@ def _made_up(
     wanted: int,
     random_state: int,
 ) -> FloatArray:
-    """About as many new rows of an action as wanted, or none, shape (rows, columns)."""
+    """About the requested number of new rows of an action, or none, shape (rows, columns)."""
     none = np.empty((0, scaled.shape[1]))
     count = int(np.sum(chosen == action))
     if count < 2 or not scaled.shape[1]:
@@ -144,12 +144,12 @@ def _made_up(
         random_state=random_state,
     )
     with warnings.catch_warnings():
-        # That an action then has more rows than others without missing numbers, and the like.
+        # For example: an action has more rows without missing numbers than the others.
         warnings.simplefilter("ignore")
         try:
             matrix, _ = smote.fit_resample(scaled, chosen)
         except ValueError:
-            # One action only, or every row of this one is surrounded by other actions.
+            # There is only one action, or other actions surround every row of this one.
             return none
     return np.asarray(matrix[len(chosen) :], dtype=np.float64)
 
@@ -163,7 +163,7 @@ def _with_whole_indicators(rows: Float32Array, asked: Sequence[Number | Indicato
     whole = rows.copy()
     for columns in groups.values():
         shares = rows[:, columns]
-        # None of them is a value of its own: false, or missing, or nothing done before.
+        # All zeros is a value too: false, missing, or nothing done before.
         none = 1 - shares.sum(axis=1, keepdims=True)
         nearest = np.argmax(np.hstack([shares, none]), axis=1)
         whole[:, columns] = np.equal(nearest[:, np.newaxis], np.arange(len(columns)))

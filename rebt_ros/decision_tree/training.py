@@ -32,7 +32,7 @@ from rebt_ros.demonstration.table import DemonstrationTable
 if TYPE_CHECKING:
     from sklearn.tree import DecisionTreeClassifier
 
-#: Tables and trees that are in the making at the same time, whatever the number of cores.
+#: Maximum number of tables and trees in the making at a time, whatever the number of cores.
 _MOST_AT_A_TIME = 4
 
 
@@ -41,17 +41,17 @@ class FitOptions:
     """How to fit a decision tree."""
 
     vocabulary: Vocabulary = FEATURES_ALONE
-    """What the tree may test beside the features."""
+    """What the tree may test besides features."""
     max_depth: int | None = None
     """Splits on the longest path; None for no limit."""
     random_state: int = 0
-    """Decides between equally good splits, and which rows are made up."""
+    """Breaks ties between equally good splits, and decides which rows are made up."""
     upsample: Upsampling = Upsampling.NONE
-    """Rows to fit the tree to beside those of the table; its leaves count them, too."""
+    """Additional rows to fit the tree to; its leaves count them too."""
 
     def classifier(self) -> DecisionTreeClassifier:
         """What is fitted."""
-        # It takes longer to import than all else that shows a learned tree.
+        # Importing it takes longer than everything else that shows a learned tree.
         from sklearn.tree import DecisionTreeClassifier
 
         return DecisionTreeClassifier(
@@ -59,7 +59,7 @@ class FitOptions:
         )
 
 
-#: How a tree is fitted where nothing is said.
+#: How a tree is fitted by default.
 PLAIN = FitOptions()
 
 
@@ -80,13 +80,13 @@ def fit(table: DemonstrationTable, options: FitOptions = PLAIN) -> FittedTree:
 def fit_again(
     table: DemonstrationTable, fitted: FittedTree, number: int, share: float
 ) -> FittedTree:
-    """Another tree of the same rows, whose splits are chosen from random columns.
+    """Another tree for the same rows, whose splits are chosen from random columns.
 
     Args:
         table: What a tree was fitted to, without made-up rows.
-        fitted: That tree, whose options are kept.
+        fitted: That tree, whose options apply.
         number: Number of the draw.
-        share: Of the columns that a split is chosen from, in (0, 1].
+        share: Share of the columns that a split is chosen from, in (0, 1].
     """
     options = FitOptions(
         fitted.vocabulary, fitted.max_depth, fitted.random_state + number, Upsampling.NONE
@@ -107,35 +107,35 @@ def fit_parts(
     Args:
         table: All rows.
         parts: Rows of each part, shape (rows,); as in `DemonstrationTable.where`.
-        options: Of each fit.
+        options: Options of each fit.
 
     Yields:
         The tree of the table, then those of the parts.
     """
     if options.upsample is not Upsampling.NONE:
-        # The library that upsampling is done with is not known to stand threads.
+        # The upsampling library may not be thread-safe.
         for rows in (np.ones(len(table), dtype=bool), *parts):
             with _quiet():
                 yield _fitted(table.where(rows), options)
         return
-    # Threads are enough: scikit-learn lets go of Python's lock while it grows a tree.
+    # Threads are enough: scikit-learn releases Python's lock while it grows a tree.
     workers = min(_MOST_AT_A_TIME, os.cpu_count() or 1)
     with _quiet(), ThreadPoolExecutor(workers) as pool:
         yield from pool.map(_Parts(table, parts, options).fitted, range(len(parts) + 1))
 
 
 class _Parts:
-    """Parts of a table that share one matrix, in which the rows outside a part weigh nothing.
+    """Parts of a table that share one matrix, in which rows outside a part have no weight.
 
-    scikit-learn leaves such rows out, so that each tree is the one that a matrix of its own would
-    give: only sums of whole numbers decide about it, whatever their order.
+    scikit-learn ignores such rows, so each tree is the one that a separate matrix would give: only
+    sums of whole numbers decide it, whatever their order.
     """
 
     def __init__(
         self, table: DemonstrationTable, parts: Sequence[BoolArray], options: FitOptions
     ) -> None:
         self._table, self._parts, self._options = table, parts, options
-        # LAT of a part differs where rows before are missing: those rows are appended.
+        # LAT of a part differs after rows that it lacks: the rows that differ are appended.
         with_lat = options.vocabulary.history is History.LAST
         changed = [_changed(table, part) if with_lat else _NO_ROWS for part in parts]
         again, last = (np.concatenate(one) for one in zip(_NO_ROWS, *changed, strict=True))
@@ -144,7 +144,7 @@ class _Parts:
             appended = self._matrix[len(table) :]
             appended[:] = self._matrix[again]
             encode_history(appended, last, len(table.actions))
-        # Small numbers: scikit-learn sorts them, and copies them more than once.
+        # Small integers: scikit-learn sorts them, and copies them several times.
         kind = np.min_scalar_type(len(table.actions))
         self._chosen = np.append(table.chosen, table.chosen[again]).astype(kind)
         its = table.row_weights
@@ -184,9 +184,9 @@ def _changed(table: DemonstrationTable, part: BoolArray) -> _Changed:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without a warning that takes actions, which are codes here, for a regression's numbers.
+    """Suppresses a warning that mistakes codes of actions for a regression's numbers.
 
-    Warnings are switched for the whole process, so this stands around threads, not in them.
+    Warnings are switched for the whole process, so this is used around threads, not in them.
     """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="The number of unique classes")
@@ -228,7 +228,7 @@ def _as_fitted(
 def _grown(classifier: DecisionTreeClassifier, actions: int) -> GrownTree:
     tree = classifier.tree_
     weights = tree.weighted_n_node_samples
-    # Shares of rows; scaled back to whole rows, which keeps ties exact.
+    # Shares of rows, scaled back to whole rows: this keeps ties exact.
     rows = np.rint(tree.value[:, 0, :] * weights[:, np.newaxis]).astype(np.int64)
     counts = np.zeros((tree.node_count, actions), dtype=np.int64)
     counts[:, classifier.classes_] = rows

@@ -16,11 +16,11 @@ class Leaf:
     """Where a decision path ends."""
 
     distribution: tuple[int, ...]
-    """Training rows of each action, made-up ones among them, in the order of the tree's actions."""
+    """Training rows of each action, including made-up ones, in the order of the tree's actions."""
 
     @property
     def most_probable(self) -> int:
-        """Position of the most frequent action; the first one of several."""
+        """Position of the most frequent action; of equals, the first."""
         return self.distribution.index(max(self.distribution))
 
 
@@ -73,8 +73,8 @@ class DecisionTree:
     def paths(self) -> Iterator[tuple[Conjunction, Leaf]]:
         """Every leaf with the conjunction of the literals that lead to it, from left to right.
 
-        A condition that is tested again on a path, as thresholds at the edge of single precision
-        can be, stands in its conjunction once; a path that contradicts itself is left out.
+        A condition that a path tests twice, as may happen with thresholds at the limit of single
+        precision, is in its conjunction once.  A path that contradicts itself is left out.
         """
         waiting: list[tuple[tuple[Literal, ...], DecisionNode]] = [((), self.root)]
         while waiting:

@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Upsampling(Enum):
-    """Which rows a decision tree is fitted to beside those that were shown."""
+    """Which rows a decision tree is fitted to besides the shown ones."""
 
     NONE = "none"
     SVM_SMOTE = "svm-smote"

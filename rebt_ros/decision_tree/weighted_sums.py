@@ -1,11 +1,11 @@
 """Which weighted sums of features a tree may test: ``angle + 0.4 × spin > 0.02``.
 
-Whoever weighs one measurement against another, as in braking by distance and speed or in balancing,
-draws a slanted line through the states.  A tree that compares one feature at a time follows it in
-steps, with many splits that many rows are needed for.  So lines are looked for in the parts of a
-tree that have many leaves.  Each parts two actions, by as few features as pay for themselves, is
-drawn once more through the rows that are close to it, which tell best where it lies, and is offered
-where the whole description of the rows gets shorter by it (see `description_length`).
+Weighing one measurement against another, as in braking by distance and speed or in balancing, draws
+a slanted line through the states.  A tree that compares one feature at a time follows it in steps,
+which take many splits and many rows.  So lines are searched for in the parts of a tree that have
+many leaves.  Each separates two actions, by as few features as pay for themselves.  It is then
+refitted to the rows close to it, which best determine its position, and offered if it shortens the
+description of the rows (see `description_length`).
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import WeightedSum
 
-#: How many sums are offered, and how many are tried for each.
+#: Number of sums offered, and of sums tried for each.
 _MOST_SUMS, _MOST_TRIED = 4, 5
-#: Fewer different values than that are counts, or places of a grid, which nobody weighs.
+#: Fewer distinct values are counts, or positions on a grid, which nobody weighs.
 _LEAST_VALUES = 20
-#: Sums are made of so many features, the first ones.
+#: Only this many features, the first ones, make sums.
 _MOST_FEATURES = 24
-#: In how many parts of a tree lines are looked for, and how many leaves a part has.
+#: Number of parts of a tree that are searched for lines, and leaves of a part.
 _MOST_PARTS, _LEAST_LEAVES = 4, 4
-#: Lines part the most frequent actions of a part: so many, with so many rows.
+#: Lines separate the most frequent actions of a part: their number, and minimum rows of each.
 _MOST_ACTIONS, _LEAST_ROWS = 4, 8
-#: Of more rows of an action, so many tell enough.
+#: Maximum number of rows of an action that are used.
 _MOST_ROWS = 500
-#: Significant digits of weights that are tried, and of those of a line while it is looked for.
+#: Significant digits of weights to try, and of weights during the search for a line.
 _DIGITS, _USUAL = (2, 3), 2
-#: How large weights of states that are scaled to their spread may be, while a line is looked for,
-#: and once it is drawn through the rows that are close to it: a variance, as of a prior.
+#: Prior variance of the weights of scaled states, during the search for a line, and when it is
+#: refitted to the rows close to it.
 _LOOSE, _LOOSER = 1e2, 1e6
-#: Of more features than that, several are left out at a time.
+#: With more features than this, several are left out at a time.
 _FEW = 8
-#: Steps of Newton's method, of which a dozen do, and when there is no more to gain.
+#: Maximum number of steps of Newton's method (a dozen are usual), and the gain that ends it.
 _MOST_STEPS, _CLOSE = 30, 1e-6
 
 
@@ -57,11 +57,11 @@ def likely_sums(
 
     Args:
         table: What the tree was fitted to.
-        fitted: By what else there is to test.
+        fitted: The tree without these sums.
         options: How it was fitted.
 
     Returns:
-        At most four; none where they do not make the description shorter.
+        At most four; none if they do not shorten the description.
     """
     measured = _measured(table)
     if len(measured) < 2:
@@ -90,7 +90,7 @@ class _Described:
     fitted: FittedTree
     sums: tuple[WeightedSum, ...]
     bits: float
-    """What it takes to describe the rows by it, and to say what its sums are."""
+    """Bits that describe the rows and its sums."""
 
 
 class _Describing:
@@ -99,7 +99,7 @@ class _Describing:
     Args:
         table: What is described.
         options: How trees are fitted.
-        features: How many features a sum can be of.
+        features: Number of features that sums can have.
     """
 
     def __init__(self, table: DemonstrationTable, options: FitOptions, features: int) -> None:
@@ -107,7 +107,7 @@ class _Describing:
         self._features = features
 
     def by(self, sums: tuple[WeightedSum, ...]) -> _Described:
-        """By the tree that may test some sums."""
+        """Describes the rows by the tree that may test these sums."""
         fitted = self._fitted(sums)
         stating = sum(
             _term_bits(self._features, _digits(weight)) for one in sums for _, weight in one.terms
@@ -115,9 +115,9 @@ class _Describing:
         return _Described(fitted, sums, shortest_description(fitted).bits + stating)
 
     def likely(self, best: _Described, found: Sequence[WeightedSum]) -> Sequence[WeightedSum]:
-        """Those of some further sums that a tree with all of them makes most use of.
+        """The further sums that a tree with all of them uses most.
 
-        There are none where not even that tree is shorter to say.
+        None if not even this tree has a shorter description.
         """
         if len(found) <= _MOST_TRIED:
             return found
@@ -133,17 +133,17 @@ class _Describing:
 
 
 def _term_bits(features: int, digits: int = _USUAL) -> float:
-    """What it takes to state a feature and its weight, which has a sign."""
+    """Bits of a feature and its signed weight."""
     return math.log2(features) + 1 + math.log2(9 * 10 ** (digits - 1))
 
 
 def _digits(weight: float) -> int:
-    """How many significant digits a weight has, of those that are tried."""
+    """Number of significant digits of a weight, of those tried."""
     return next((few for few in _DIGITS if float(f"{weight:.{few}g}") == weight), _DIGITS[-1])
 
 
 def _measured(table: DemonstrationTable) -> list[int]:
-    """The places of the features that can be weighed."""
+    """Positions of the features that sums can have."""
     places: list[int] = []
     for place, feature in enumerate(table.features):
         if feature.kind is FeatureKind.NUMERIC and not feature.lag and len(places) < _MOST_FEATURES:
@@ -156,7 +156,7 @@ def _measured(table: DemonstrationTable) -> list[int]:
 def _lines(
     table: DemonstrationTable, fitted: FittedTree, measured: Sequence[int]
 ) -> Iterator[WeightedSum]:
-    """Sums that part two actions in some part of a tree."""
+    """Sums that separate two actions in a part of a tree."""
     states = table.states[:, measured]
     names = [table.features[place].name for place in measured]
     known = ~np.isnan(states).any(axis=1)
@@ -189,17 +189,17 @@ def _parts(table: DemonstrationTable, fitted: FittedTree) -> Iterator[BoolArray]
 
 
 def _some(is_second: BoolArray) -> IntArray:
-    """As many rows of each action, evenly spread, as tell enough."""
+    """Evenly spread rows of each action, at most `_MOST_ROWS`."""
     of_each = (np.flatnonzero(is_second == which) for which in (False, True))
     return np.concatenate([rows[:: -(-len(rows) // _MOST_ROWS)] for rows in of_each])
 
 
 def _line(states: FloatArray, is_second: BoolArray, names: Sequence[str]) -> Iterator[WeightedSum]:
-    """The sum that tells two actions apart in the fewest bits, with few digits and with more.
+    """The sum that separates two actions in the fewest bits, with few digits and with more.
 
-    There is none where one feature does.
+    None if a single feature is enough.
 
-    Features are left out one by one, always the one that matters least; of many, several at a time.
+    Features are left out one by one, the least important first; of many, several at a time.
     """
     low, high = np.percentile(states, (5, 95), axis=0)
     spread = np.where(high > low, high - low, np.ptp(states, axis=0))
@@ -232,7 +232,7 @@ def _line(states: FloatArray, is_second: BoolArray, names: Sequence[str]) -> Ite
 
 
 def _closest(distances: FloatArray, is_second: BoolArray) -> IntArray:
-    """The rows of each action that are closest to a line, as many as tell enough."""
+    """The rows of each action closest to a line, at most `_MOST_ROWS`."""
     ranked = np.argsort(distances, kind="stable")
     of_each = (ranked[is_second[ranked] == which] for which in (False, True))
     return np.concatenate([rows[:_MOST_ROWS] for rows in of_each])
@@ -241,7 +241,7 @@ def _closest(distances: FloatArray, is_second: BoolArray) -> IntArray:
 def _drawn(
     scaled: FloatArray, is_second: BoolArray, use: IntArray, variance: float
 ) -> tuple[FloatArray, float]:
-    """A line by some of the features: weights of all, and the offset."""
+    """A line in some of the features: weights of all features, and the offset."""
     weights = np.zeros(scaled.shape[1])
     *weights[use], offset = _logistic_regression(scaled[:, use], is_second, variance)
     return weights, float(offset)
@@ -250,7 +250,7 @@ def _drawn(
 def _exceptions(
     scaled: FloatArray, is_second: BoolArray, weights: FloatArray, offset: float
 ) -> int:
-    """How many rows are on the wrong side of a line."""
+    """Number of rows on the wrong side of a line."""
     return int(np.count_nonzero((scaled @ weights + offset > 0) != is_second))
 
 
@@ -261,10 +261,10 @@ def _as_sum(
     names: Sequence[str],
     digits: int,
 ) -> WeightedSum | None:
-    """The sum of the features themselves, the one that matters most first.
+    """The sum of the unscaled features, the most important first.
 
-    One of them has a weight of 1, for which the other weights lose least when they are rounded: as
-    in ``v + 4 × spin + 10 × angle``, which is ``angle + 0.1 × v + 0.4 × spin``.
+    One feature has a weight of 1, chosen such that rounding costs the other weights least:
+    ``v + 4 × spin + 10 × angle`` is ``angle + 0.1 × v + 0.4 × spin``.
     """
     order = [place for place in np.argsort(-np.abs(scaled), kind="stable") if scaled[place]]
     own = scaled / spread
@@ -286,18 +286,18 @@ def _as_sum(
 
 
 def _logistic_regression(scaled: FloatArray, is_second: BoolArray, variance: float) -> FloatArray:
-    """A line between two actions that count alike, however many rows they have.
+    """A line between two actions that count the same, however many rows they have.
 
-    By Newton's method, halving steps that go too far.  On so few rows scikit-learn's solver takes
-    many times as long, most of it before it begins.
+    Uses Newton's method, and halves steps that go too far.  With so few rows, scikit-learn's solver
+    takes many times as long, most of it before it starts.
 
     Args:
         scaled: Shape (rows, features).
         is_second: Shape (rows,).
-        variance: How large weights may be.
+        variance: Prior variance of the weights.
 
     Returns:
-        Weights of the features and, behind them, the offset, shape (features + 1,).
+        Weights of the features, followed by the offset, shape (features + 1,).
     """
     matrix = np.column_stack([scaled, np.ones(len(scaled))])
     sign = np.where(is_second, 1.0, -1.0)

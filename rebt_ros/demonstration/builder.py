@@ -1,7 +1,7 @@
-"""The only place where rows of a demonstration are born.
+"""The only place where rows of a demonstration are made.
 
 Callbacks of live nodes and loops over bags push the same messages, in the order in which they were
-received, into a `DemonstrationBuilder`; it answers with the rows that they complete.
+received, into a `DemonstrationBuilder`, which returns the rows that they complete.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from rebt_ros.demonstration.recent_states import RecentStates
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError, OptionError
 
-#: Larger values are refused: single precision, in which decision trees compare, ends soon after.
+#: Larger values are refused: decision trees compare in single precision, which ends soon after.
 LARGEST_VALUE = 1e38
 
-#: Rows per second that can be asked for.
+#: Bounds of the sample rate (rows per second).
 _LEAST_RATE, _LARGEST_RATE = 1e-6, 1e6
 
-#: Sampling pauses where no state came for this long (nanoseconds).
+#: Sampling pauses if no state arrived for this long (nanoseconds).
 _STALE = 1_000_000_000
 
 
 class Fault(Enum):
-    """What can be wrong with one message."""
+    """What may be wrong with a message."""
 
     UNKNOWN_TOPIC = "unknown topic"
     EMPTY = "empty message"
@@ -42,7 +42,7 @@ class Fault(Enum):
 
 
 class BadMessageError(InputError):
-    """A message that cannot become part of a demonstration; the builder is as it was before."""
+    """A message that cannot become part of a demonstration; the builder is unchanged."""
 
     def __init__(self, fault: Fault, text: str) -> None:
         super().__init__(text)
@@ -55,9 +55,9 @@ class StateTopic:
 
     name: str
     fields: tuple[str, ...] = ()
-    """Names of its values; empty: taken from the first message's labels, else from the index."""
+    """Names of its values; empty: those of the first message's labels, or else indices."""
     may_miss: bool = False
-    """Whether values may be missing, as NaN; else a message with such a value is refused."""
+    """Whether values may be missing (NaN); otherwise a message with such a value is refused."""
 
     def __post_init__(self) -> None:
         if len(set(self.fields)) != len(self.fields):
@@ -67,23 +67,23 @@ class StateTopic:
 class DemonstrationBuilder:
     """Turns a stream of state and action messages into rows.
 
-    In event mode a row is one action message.  In sampled mode it is one instant of a fixed grid
+    In event mode, a row is one action message.  In sampled mode, it is one instant of a fixed grid,
     on each channel that has an action, from its first message on; an empty label ends the action.
 
-    A row has the newest states that the builder was given.  In event mode, messages may come with
-    the time at which they were sent; then a row has the newest states that were sent before its
-    action, in whatever order they are given.
+    A row has the newest states that the builder received.  In event mode, messages may carry the
+    time at which they were sent.  Then a row has the newest states that were sent before its
+    action, whatever the order of arrival.
 
     Args:
         topics: State topics, in the order of their features.
         channels: Action topics; each is a channel with a LAT of its own.
         sample_rate: Rows per second and channel while an action holds; None for event mode.
         before: What was done on each channel before the demonstration, most recent last.
-        recent: States by topic that were sent before the demonstration, for actions that come
-            late; the builder adds to them.
+        recent: States by topic that were sent before the demonstration, for late actions; the
+            builder adds to them.
 
     Raises:
-        OptionError: No topic or channel, one named twice, or a rate that makes no sense.
+        OptionError: There is no topic or channel, one is named twice, or the rate is out of bounds.
     """
 
     def __init__(
@@ -102,10 +102,10 @@ class DemonstrationBuilder:
         if sample_rate is not None and not (_LEAST_RATE <= sample_rate <= _LARGEST_RATE):
             raise OptionError(
                 f"the sample rate must lie between {_LEAST_RATE:g} and {_LARGEST_RATE:g} rows per "
-                f"second, not at {sample_rate}."
+                f"second, not {sample_rate}."
             )
         self._fields: dict[str, tuple[str, ...]] = {one.name: one.fields for one in topics}
-        # Topics of which the messages themselves say what their values are.
+        # Topics whose messages name their values.
         self._self_named: set[str] = set()
         self._may_miss = frozenset(one.name for one in topics if one.may_miss)
         self._latest: dict[str, tuple[float, ...]] = {}
@@ -135,19 +135,19 @@ class DemonstrationBuilder:
         """Takes a state message.
 
         Args:
-            stamp: What rows say that it completes, nanoseconds: when it was received, as a rule.
-            topic: State topic it came on.
+            stamp: Stamp of the rows that it completes, nanoseconds; usually when it was received.
+            topic: The state topic.
             values: Its numbers.
-            labels: Names that the message itself gives to its numbers.  Those of the topic's first
-                message name its features, if nothing else does; where a later message has them in
-                another order, its numbers are put in theirs.
-            sent: When it was sent, nanoseconds, by the clock of all messages; None: not known.
+            labels: Names that the message gives to its numbers.  Those of the topic's first message
+                name its features, if nothing else does.  The numbers of a later message with
+                another order of labels are put in this order.
+            sent: When it was sent, nanoseconds, by the clock of all messages; None if unknown.
 
         Returns:
             The sampled rows that were due before it; none in event mode.
 
         Raises:
-            BadMessageError: It was not taken.
+            BadMessageError: The message was refused.
         """
         state = tuple(map(float, values))
         self._check_state(topic, state)
@@ -175,16 +175,16 @@ class DemonstrationBuilder:
         """Takes an action message.
 
         Args:
-            stamp: What its row says, nanoseconds: when it was received, as a rule.
-            channel: Action topic it came on.
-            label: The action; empty where none is taken any longer.
-            sent: When it was sent, nanoseconds, by the clock of all messages; None: not known.
+            stamp: Stamp of its row, nanoseconds; usually when it was received.
+            channel: The action topic.
+            label: The action; empty if the action ends.
+            sent: When it was sent, nanoseconds, by the clock of all messages; None if unknown.
 
         Returns:
-            The rows that it completes: itself in event mode, those due before it in sampled mode.
+            The rows that it completes: its own in event mode, those due before it in sampled mode.
 
         Raises:
-            BadMessageError: It was not taken.
+            BadMessageError: The message was refused.
         """
         if channel not in self._history:
             raise BadMessageError(
@@ -209,7 +209,7 @@ class DemonstrationBuilder:
         return (self._row(stamp, channel, label, states),)
 
     def interrupt(self) -> None:
-        """Ends all actions that are held, as messages are missing from here on."""
+        """Ends all held actions, because messages are missing from here on."""
         self._held.clear()
         self._next_sample = None
 
@@ -217,7 +217,7 @@ class DemonstrationBuilder:
         """The state of each topic that an action belongs to.
 
         Raises:
-            BadMessageError: Not all of them are known.
+            BadMessageError: One of them is unknown.
         """
         states = []
         for topic in self._fields:
@@ -250,7 +250,7 @@ class DemonstrationBuilder:
                 f"state topic {topic!r} sent {len(state)} values where {expected} were expected: "
                 "every message of a topic must have the same length.",
             )
-        # A sum tells of all values at once whether one is not finite.
+        # The sum shows at once whether any value is not finite.
         if (
             math.isfinite(sum(state))
             and -LARGEST_VALUE <= min(state) <= max(state) <= LARGEST_VALUE
@@ -278,14 +278,14 @@ class DemonstrationBuilder:
         """The values of a message in the order of the features.
 
         Raises:
-            BadMessageError: Its names are other ones.
+            BadMessageError: Its names differ from those of the topic.
         """
         fields = self._fields[topic]
         if tuple(labels) == fields or not _names(labels, state):
             return state
         places = {label: place for place, label in enumerate(labels)}
         if len(fields) == 1:
-            # A label may say anything of a single value, such as its unit or a count.
+            # The label of a single value may be anything, such as its unit or a count.
             return state
         if places.keys() != set(fields):
             raise BadMessageError(
@@ -313,15 +313,15 @@ class DemonstrationBuilder:
             rows += [self._row(self._next_sample, *held, states) for held in self._held.items()]
             self._next_sample += self._period
         if self._next_sample < stamp or self._next_sample > stamp + self._period:
-            # Silence or a clock that was set back: the grid starts anew here.
+            # After silence, or when the clock was set back, the grid starts again here.
             self._next_sample = stamp
-        # No message is newer than the present one, whatever the clock said.
+        # No message is newer than the current one, whatever the clock said.
         self._last_observed = min(self._last_observed, stamp)
         return tuple(rows)
 
 
 def _features(fields: dict[str, tuple[str, ...]]) -> tuple[Feature, ...]:
-    """A feature has its field's name, led by its topic where two topics share a field name."""
+    """A feature has the name of its field, after that of its topic if two topics share the name."""
     names = [name for topic in fields for name in fields[topic]]
     ambiguous = len(set(names)) != len(names)
     return tuple(

@@ -1,4 +1,4 @@
-"""Categories that come to be known while messages are read."""
+"""Categories that are discovered while messages are read."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-#: Most categories of one feature; what comes after them is missing.
+#: Maximum number of categories of a feature; further ones are missing values.
 MOST_CATEGORIES: Final = 1000
 
 
 class Categories:
-    """The categories of one feature, by number, as far as they were seen.
+    """The categories of a feature, numbered as they were seen.
 
     Args:
-        known: Those that there are; empty for all that will be seen.
+        known: All categories that count; empty if all that will be seen do.
 
     >>> categories = Categories()
     >>> categories.code("manual"), categories.code("auto"), categories.code("manual")
@@ -25,10 +25,10 @@ class Categories:
         self.names = list(known)
         self._codes = {name: float(code) for code, name in enumerate(known)}
         self.is_open = not known
-        """Whether it takes what it does not know."""
+        """Whether it accepts new categories."""
 
     def code(self, name: str) -> float:
-        """The number of a category; NaN where it is none, or there are too many."""
+        """The number of a category; NaN if it is not one, or if there are too many."""
         code = self._codes.get(name)
         if code is not None:
             return code

@@ -13,20 +13,20 @@ import numpy as np
 from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.demonstration.schema import Feature
 
-#: Channel of actions that came without a topic, as in a CSV table.
+#: Channel of actions without a topic, as in a CSV table.
 DEFAULT_CHANNEL = "action"
 
-#: Stamps closer to each other than that are numbers of rows (nanoseconds).
+#: Stamps closer to each other than this are row numbers (nanoseconds).
 NO_TIME = 1_000
 
 
 class RowKind(Enum):
-    """What a row stands for, and so what was done "before" it."""
+    """What a row stands for, which decides what was done "before" it."""
 
     EVENT = "event"
-    """One action, from its beginning to its end; before it is the action that ended last."""
+    """A whole action, from beginning to end; before it is the action that ended last."""
     SAMPLE = "sample"
-    """One instant of an action that is held; before it is what was done an instant earlier."""
+    """An instant of a held action; before it is what was done an instant earlier."""
 
 
 class Row(NamedTuple):
@@ -35,10 +35,10 @@ class Row(NamedTuple):
     stamp: int
     """Nanoseconds."""
     channel: str
-    """Action topic it came on."""
+    """Its action topic."""
     action: str
     last_action: str | None
-    """LAT of its channel; None before a second action was taken."""
+    """LAT of its channel; None until a second action was taken."""
     state: tuple[float, ...]
     """In the order of the demonstration's features; NaN where missing."""
 
@@ -51,7 +51,7 @@ class Demonstration:
     """
 
     name: str
-    """Where it came from, for messages."""
+    """Its source, for messages."""
     features: tuple[Feature, ...]
     states: FloatArray
     """Shape (rows, features)."""
@@ -66,9 +66,9 @@ class Demonstration:
     channel: IntArray
     """Position in `channels` of each row's channel, shape (rows,)."""
     before: Mapping[str, str] = field(default_factory=dict)
-    """LAT of the first row of a channel, where something was done before that was not recorded:
-    a correction begins amid what the robot did by itself.  It is not the previous action, of which
-    a first row has none."""
+    """LAT of the first row of a channel, if something was done before that was not recorded: a
+    correction begins in the middle of what the robot did by itself.  It is not the previous action,
+    which a first row does not have."""
     row_kind: RowKind = RowKind.EVENT
 
     def __post_init__(self) -> None:
@@ -95,14 +95,14 @@ class Demonstration:
         row_kind: RowKind = RowKind.EVENT,
         values: Numbers | None = None,
     ) -> Demonstration:
-        """Gathers rows into columns, without keeping them.
+        """Gathers rows into columns, without keeping the rows.
 
         Args:
-            name: What it is called.
-            features: Of its states.
+            name: Name of the demonstration.
+            features: Features of its states.
             rows: Its rows.
-            row_kind: What they are.
-            values: Where the states go, which holds nothing yet; None for memory.
+            row_kind: What they stand for.
+            values: An empty array for the states; None for one in memory.
 
         Raises:
             InputError: There is no room for them.
@@ -129,17 +129,17 @@ class Demonstration:
 
 
 class Numbers(Protocol):
-    """Takes numbers that come one after the other."""
+    """Collects numbers that arrive one after another."""
 
     def extend(self, values: Iterable[float], /) -> None:
         """Adds numbers."""
 
     def values(self) -> FloatArray:
-        """All of them, once nothing more comes: shape (numbers,)."""
+        """All numbers, shape (numbers,); nothing can be added after that."""
 
 
 class _InMemory:
-    """The plain way to do so."""
+    """Collects numbers in memory."""
 
     def __init__(self) -> None:
         self._values = array("d")

@@ -7,20 +7,20 @@ import numpy.typing as npt
 
 from rebt_ros.arrays import FloatArray, IntArray, in_parts
 
-#: Odd numbers that stir hashes of states.
+#: Odd numbers that mix the hashes of states.
 _GOLDEN, _ODD = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xD6E8FEB86659FD93)
 
 
 def codes_of_states(states: FloatArray) -> IntArray:
     """A number for each row, equal for equal states, shape (rows,).
 
-    What is missing equals what is missing.
+    Missing values equal each other.
 
     Args:
         states: Shape (rows, features).
     """
     hashes = np.zeros(len(states), dtype=np.uint64)
-    # In parts, as a large table may be on disk, where going through it once takes long enough.
+    # In parts: a large table may be on disk, where a single pass takes long enough.
     for rows in in_parts(len(states)):
         part = hashes[rows]
         for column in states[rows].T:

@@ -8,7 +8,7 @@ from typing import Any, Protocol, TypeVar
 
 from rebt_ros.arrays import FloatArray
 
-#: Numbers as a message has them: of rclpy, or of rosbags.
+#: Numbers of a message of rclpy, or of rosbags.
 Values = TypeVar("Values", Sequence[float], FloatArray)
 
 
@@ -43,9 +43,9 @@ def fields_of(dimensions: Sequence[Dimension], count: int) -> tuple[str, ...]:
         count: How many values the message has.
 
     Returns:
-        One name per value, all different: the labels where there is one dimension of size 1 (or 0)
-        per value, or the parts of a single label that lists them with commas; empty where the
-        labels are neither, as those of a matrix.
+        One name per value, all different: the labels if there is one dimension of size 1 (or 0)
+        per value, or the parts of a single label that lists them with commas.  Empty if the labels
+        are neither, as those of a matrix.
 
     >>> fields_of([Dimension("front,left,right", 3)], 3)
     ('front', 'left', 'right')
@@ -71,7 +71,7 @@ def values_of(message: ArrayMessage[Values]) -> Values:
 
 
 def names_of(message: ArrayMessage[Values]) -> tuple[str, ...]:
-    """The names that its layout gives to the values of an array message; empty where to none."""
+    """The names that its layout gives to the values of an array message; empty if none."""
     dimensions = [Dimension(one.label, one.size) for one in message.layout.dim]
     return fields_of(dimensions, len(values_of(message)))
 

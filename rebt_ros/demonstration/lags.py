@@ -1,7 +1,7 @@
-"""Lagged features: what the state was some rows before.
+"""Lagged features: the state some rows earlier.
 
-A row back is a step back in time only where rows are evenly spaced: recorded with a sample rate,
-or samples of a table.
+One row back is a fixed step back in time only if rows are evenly spaced: recorded with a sample
+rate, or samples in a table.
 """
 
 from __future__ import annotations
@@ -15,28 +15,28 @@ from rebt_ros.demonstration.large_arrays import roomy
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 
-#: Gaps between rows that differ from the median by less than this share of it are equal.
+#: Gaps between rows are equal if they differ from the median by less than this share of it.
 _JITTER = 0.25
-#: Least share of equal gaps in rows that are evenly spaced: a recording may have a few pauses.
+#: Minimum share of equal gaps in evenly spaced rows: a recording may have a few pauses.
 _EVEN = 0.9
 
 
 def with_lags(table: DemonstrationTable, lags: int) -> DemonstrationTable:
-    """The table with the values that each feature had 1 to `lags` rows before.
+    """The table with the values that each feature had 1 to `lags` rows earlier.
 
-    Looking back ends at the border of a demonstration: its first k rows lack the value of k rows
-    before.  Take parts of the table (`DemonstrationTable.where`) afterwards, not before.
+    Looking back ends at the beginning of a demonstration: in its first k rows, the value of k rows
+    earlier is missing.  Take parts of the table (`DemonstrationTable.where`) only afterwards.
 
     Args:
         table: Rows of one channel, without lagged features.
         lags: How many rows to look back, 0 or more.
 
     Returns:
-        The same rows; all features of the table, then all of one row before, and so on.
+        The same rows; all features of the table, then all of one row earlier, and so on.
     """
     if not lags:
         return table
-    # Position in its demonstration; a demonstration's rows stand together.
+    # Position in its demonstration, whose rows are contiguous.
     row = np.arange(len(table)) - np.searchsorted(table.demonstration, table.demonstration)
     width = len(table.features)
     states = roomy((len(table), width * (1 + lags)))

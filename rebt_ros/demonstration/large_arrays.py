@@ -1,6 +1,6 @@
-"""Arrays that may be larger than memory: from a size on they are on disk, and mapped.
+"""Arrays that may be larger than memory: large ones are mapped files.
 
-Their files have no name: they are gone with the process that made them, whatever way that ends.
+The files have no name, so they vanish with the process that made them, however it ends.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy as np
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray, in_parts
 from rebt_ros.errors import InputError
 
-#: Arrays of that size and more are on disk (bytes).
+#: Arrays of at least this size are on disk (bytes).
 ON_DISK: Final = 1 << 28
 
-#: Numbers that are written to disk together.
+#: How many numbers are written to disk at a time.
 _PASSING: Final = 1 << 20
 
 #: For large files that need not survive a restart (see hier(7)): /tmp may be in memory.
@@ -41,7 +41,7 @@ def roomy(shape: tuple[int, ...]) -> FloatArray:
     directory = _directory()
     try:
         with tempfile.TemporaryFile(dir=directory) as file:
-            # What finds no room later would end the process.
+            # Running out of room later would end the process.
             os.posix_fallocate(file.fileno(), 0, size)
             mapped = mmap.mmap(file.fileno(), size)
     except OSError as err:
@@ -61,7 +61,7 @@ def _no_room(size: int, directory: str | Path, err: OSError) -> InputError:
 
 
 def rows_of(states: FloatArray, rows: BoolArray) -> FloatArray:
-    """Some rows of an array as one of their own, shape (rows, columns)."""
+    """Some rows of an array as an array of their own, shape (rows, columns)."""
     places = np.flatnonzero(rows)
     found = roomy((len(places), states.shape[1]))
     for part in in_parts(len(places)):
@@ -70,7 +70,7 @@ def rows_of(states: FloatArray, rows: BoolArray) -> FloatArray:
 
 
 class GrowingArray:
-    """Numbers that come one after the other: in memory while they are few, and on disk after that.
+    """Numbers that arrive one after another: in memory while they are few, on disk after that.
 
     >>> growing = GrowingArray()
     >>> growing.extend((0.5, 2.0))
@@ -112,7 +112,7 @@ class GrowingArray:
         try:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(dir=directory)  # noqa: SIM115
-                # From here on they only pass through memory.
+                # From here on, numbers only pass through memory.
                 self._most = _PASSING
             for part in in_parts(len(self._recent)):
                 self._file.write(memoryview(self._recent)[part])
@@ -125,7 +125,7 @@ class GrowingArray:
 
 
 class Spool:
-    """Takes over arrays: into memory while they are small together, and onto disk after that."""
+    """Keeps arrays: in memory while their total size is small, on disk after that."""
 
     def __init__(self) -> None:
         self._in_memory = 0
@@ -151,7 +151,7 @@ class Spool:
 
 
 def is_mapped(values: FloatArray | IntArray) -> bool:
-    """Whether an array is a part of a mapped file."""
+    """Whether an array is part of a mapped file."""
     base: object = values
     while isinstance(base, np.ndarray):
         base = base.base

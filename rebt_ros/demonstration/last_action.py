@@ -1,4 +1,4 @@
-"""What was done before row t, which a tree may test.
+"""What was done before row t, for trees to test.
 
 previous action
     The action of the row before; none in the first row of a demonstration.
@@ -20,7 +20,7 @@ NO_ACTION = -1
 
 
 class History(Enum):
-    """What a tree may test of what was done before."""
+    """Which earlier action a tree may test."""
 
     NONE = "none"
     PREVIOUS = "previous"
@@ -30,7 +30,7 @@ class History(Enum):
 
 
 class ActionHistory:
-    """What was done so far on one channel.
+    """What has been done on a channel so far.
 
     >>> history = ActionHistory(["turn", "go", "go"])
     >>> history.previous
@@ -42,7 +42,7 @@ class ActionHistory:
     def __init__(self, actions: Iterable[str] = ()) -> None:
         self._recent: list[str] = []
         self.previous: str | None = None
-        """The previous action; None where nothing is known to have been done."""
+        """The previous action; None if none is known."""
         for action in actions:
             self.take(action)
 
@@ -65,7 +65,7 @@ class ActionHistory:
 
     @property
     def taken(self) -> tuple[str, ...]:
-        """The distinct actions, the most recent one last: `ActionHistory` of them is the same."""
+        """The distinct actions, the most recent one last; they make an equal `ActionHistory`."""
         return tuple(reversed(self._recent))
 
     def clear(self) -> None:
@@ -79,7 +79,7 @@ def previous_actions(actions: IntArray, demonstrations: IntArray) -> IntArray:
 
     Args:
         actions: Action codes in the order in which they were taken, shape (rows,).
-        demonstrations: Number of each row's demonstration, shape (rows,); its rows stand together.
+        demonstrations: Number of each row's demonstration, shape (rows,); its rows are contiguous.
 
     Returns:
         Codes, shape (rows,); `NO_ACTION` in the first row of each demonstration.
@@ -100,8 +100,8 @@ def last_actions(
 
     Args:
         actions: Action codes in the order in which they were taken, shape (rows,).
-        demonstrations: Number of each row's demonstration, shape (rows,); its rows stand together.
-        before: LAT of the first row of each demonstration, by its number; none where it is None.
+        demonstrations: Number of each row's demonstration, shape (rows,); its rows are contiguous.
+        before: LAT of the first row of each demonstration, by its number; None for none at all.
 
     Returns:
         Codes of the last actions taken, shape (rows,); `NO_ACTION` where there is none.

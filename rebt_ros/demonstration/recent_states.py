@@ -1,4 +1,4 @@
-"""The states of the last while, so that an action finds the one that held when it was sent."""
+"""Recent states, in which an action finds the one that held when it was sent."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from array import array
 from bisect import bisect_right
 from collections.abc import Sequence
 
-#: So many states are kept of a topic, or fewer that have so many values together.
+#: Maximum number of states kept per topic, and of their values in total.
 _STATES = 20_000
 _VALUES = 500_000
 
-#: A state that was sent so long before the newest one tells of a clock that was set back (ns).
+#: A state sent this much before the newest one means that the clock was set back (ns).
 _SET_BACK = 60_000_000_000
 
 
 class RecentStates:
     """States of one topic by when they were sent.
 
-    They are added in about that order: a state that comes late finds its place among the others.
+    They are added in about this order; a late state finds its place among the others.
 
     >>> states = RecentStates()
     >>> for sent, state in ((10, [1.0]), (30, [3.0]), (20, [2.0])):
@@ -31,11 +31,11 @@ class RecentStates:
         self._states: list[array[float]] = []
 
     def add(self, sent: int, state: Sequence[float]) -> None:
-        """Takes a state; one that was sent at the same time is replaced.
+        """Adds a state, which replaces one that was sent at the same time.
 
         Args:
             sent: When it was sent, nanoseconds.
-            state: Its values; where there are more or fewer than before, what was before is gone.
+            state: Its values; if their number changes, all earlier states are dropped.
         """
         if self._sent and (
             len(state) != len(self._states[-1]) or sent < self._sent[-1] - _SET_BACK
@@ -52,7 +52,7 @@ class RecentStates:
         self._trim(len(values))
 
     def at(self, when: int) -> tuple[float, ...] | None:
-        """The state that was sent last at a time; None where none is known from before it."""
+        """The last state sent up to this time; None if none is known."""
         place = bisect_right(self._sent, when)
         return tuple(self._states[place - 1]) if place else None
 

@@ -1,4 +1,4 @@
-"""Rows that several demonstrations hold, as where two recorders heard the same messages."""
+"""Rows that several demonstrations share, as after two recorders heard the same messages."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from numpy.typing import NDArray
 from rebt_ros.arrays import IntArray
 from rebt_ros.demonstration.demonstration import Demonstration
 
-#: Two demonstrations with more of their rows in common are the same one (share of the shorter one).
+#: Demonstrations that share more of their rows are the same one (share of the shorter one).
 _SAME: Final = 0.5
-#: Fewer rows in common do not tell.
+#: Fewer shared rows say nothing.
 _FEWEST: Final = 5
-#: Stamps below are positions of rows, which tables of other demonstrations have as well (ns).
+#: Lower stamps are row numbers, which other tables have as well (ns).
 _FIRST_TIME: Final = 1_000_000_000
-#: Of demonstrations without times, fewer do not tell either.
+#: Fewer shared rows say nothing about demonstrations without times.
 _FEWEST_IN_ALL: Final = 20
-#: Of more rows than this only a part is looked at.
+#: If there are more rows than this, only some are compared.
 _MOST: Final = 500_000
-#: So many pairs are named.
+#: Number of pairs that notes name.
 _NAMED: Final = 5
 
-#: Spreads numbers over all that there are.
+#: Multiplier that spreads numbers over all 64 bits.
 _ODD: Final = np.uint64(0x9E3779B97F4A7C15)
 
 Hashes = NDArray[np.uint64]
 
 
 def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
-    """Notes on rows that are there twice: in two demonstrations, or in a single one.
+    """Notes on rows that occur twice, in two demonstrations or in a single one.
 
     Args:
-        demonstrations: All that are learned from; those without times must have all rows in
-            common, as many tables have some at the same positions.
+        demonstrations: All that are learned from.  Those without times must share all rows, since
+            many tables share some rows at the same positions.
     """
     tell_time = [len(one.stamps) and one.stamps.min() >= _FIRST_TIME for one in demonstrations]
     part = sum(len(one.stamps) for one in demonstrations) // _MOST + 1
@@ -65,7 +65,7 @@ def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
 
 
 def _hashes(demonstration: Demonstration, part: int) -> Hashes:
-    """A number for each different row, or for one in so many."""
+    """A number for each distinct row, or for one in so many."""
     mixed = demonstration.stamps.astype(np.uint64)
     for column in _columns(demonstration):
         mixed = (mixed ^ column) * _ODD
@@ -74,11 +74,11 @@ def _hashes(demonstration: Demonstration, part: int) -> Hashes:
 
 
 def _columns(demonstration: Demonstration) -> Iterator[Hashes]:
-    """What is in the rows beside stamps, column by column."""
+    """The contents of the rows except stamps, column by column."""
     yield _texts(demonstration.actions)[demonstration.chosen]
     yield _texts(demonstration.channels)[demonstration.channel]
     for values in demonstration.states.T:
-        # The sum is of the same bits for both zeros.
+        # Adding 0 gives both zeros the same bits.
         yield (values + 0.0).view(np.uint64)
 
 
@@ -87,7 +87,7 @@ def _texts(texts: Sequence[str]) -> Hashes:
 
 
 def _shared(hashes: Hashes, owner: IntArray) -> Counter[tuple[int, int]]:
-    """How many rows the first two demonstrations that hold a row have in common, pair by pair."""
+    """How many rows each pair of demonstrations shares; a row counts for the first two."""
     order = np.argsort(hashes, kind="stable")
     hashes, owner = hashes[order], owner[order]
     again = np.flatnonzero(hashes[1:] == hashes[:-1])

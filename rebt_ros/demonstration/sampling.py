@@ -1,9 +1,9 @@
-"""Some rows of a large table that stand for all: whole demonstrations, of rare actions before all.
+"""A sample of the rows of a large table: whole demonstrations, above all those of rare actions.
 
 unit
     A demonstration, or a stretch of one that is longer than a fiftieth of the sample.
 rare
-    Of two actions, the one whose units have fewer rows together.
+    An action is rarer than another one if the units that show it have fewer rows in total.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.demonstration.table import DemonstrationTable
 
-#: The longest unit: this share of the sample.
+#: Length of the longest unit, as a share of the sample.
 _LONGEST = 1 / 50
-#: Of the sample, what is taken for the sake of single actions.
+#: Share of the sample that is chosen by action.
 _FOR_ACTIONS = 1 / 2
 
 
@@ -26,30 +26,30 @@ class Sample:
     """Some rows of a table."""
 
     rows: BoolArray
-    """Which of them, shape (rows,)."""
+    """Which rows are in it, shape (rows,)."""
     demonstrations: int
-    """How many demonstrations they are of."""
+    """Number of demonstrations that it has rows of."""
     complete: tuple[str, ...]
-    """The actions of which no row is left out, in the order of the table's actions."""
+    """Actions with all their rows in it, in the order of the table's actions."""
 
     def __len__(self) -> int:
         return int(np.count_nonzero(self.rows))
 
 
 def sample_of(table: DemonstrationTable, rows: int) -> Sample:
-    """A sample of about so many rows, in whole units.
+    """A sample of about this many rows, in whole units.
 
-    One half of it goes to the actions in equal parts, from the rarest one on, each of which leaves
-    to the others what it does not need: all units that show it, or as many as there is room for,
-    evenly spread over time.  The other half is drawn from the rest in proportion: from strata of
-    units with the same rarest action, evenly spread over time in each.
+    One half is divided equally among the actions, the rarest first; each leaves to the others what
+    it does not need.  An action gets all units that show it, or as many as there is room for,
+    evenly spread over time.  The other half is drawn from the rest in proportion: units with the
+    same rarest action form a stratum, in each of which units are evenly spread over time.
 
     Args:
-        table: More rows than that.
-        rows: How many.
+        table: Has more rows than that.
+        rows: Number of rows.
 
     Returns:
-        Deterministic.  Every action is in it.
+        A deterministic sample with every action in it.
     """
     unit, lengths = _units(table, max(int(rows * _LONGEST), 1))
     shows = np.zeros((len(lengths), len(table.actions)), dtype=bool)
@@ -88,7 +88,7 @@ def _units(table: DemonstrationTable, longest: int) -> tuple[IntArray, IntArray]
     """The unit of each row, shape (rows,), and how many rows each has, shape (units,)."""
     begins = np.flatnonzero(np.diff(table.demonstration, prepend=-1))
     lengths = np.diff(begins, append=len(table))
-    # Stretches of a demonstration are about equally long.
+    # The stretches of a demonstration are about equally long.
     stretches = -(-lengths // longest)
     number = np.arange(stretches.sum()) - np.repeat(np.cumsum(stretches) - stretches, stretches)
     parts = np.repeat(lengths, stretches) * number // np.repeat(stretches, stretches)
@@ -97,13 +97,14 @@ def _units(table: DemonstrationTable, longest: int) -> tuple[IntArray, IntArray]
 
 
 def _spread(lengths: IntArray, rows: float) -> BoolArray:
-    """Which of some units to take for about so many rows, evenly spread; all if that is enough."""
+    """Evenly spread units with about this many rows; all units if they have no more."""
     total = int(lengths.sum())
     if rows <= 0:
         return np.zeros(len(lengths), dtype=bool)
     if total <= rows:
         return np.ones(len(lengths), dtype=bool)
-    # As many marks as units have room, at even distances along the rows: the units that have one.
+    # Marks at even distances along the rows, as many as there is room for units: takes the units
+    # that have a mark.
     marks = int(rows * len(lengths) / total)
     passed = np.cumsum(lengths) * marks // total
     return np.asarray(np.diff(passed, prepend=0) > 0)

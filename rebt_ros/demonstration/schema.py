@@ -9,7 +9,7 @@ categorical
 
 A missing value is NaN in a table, whatever the kind.
 
-A lagged feature is the value that another one, its source, had some rows before (see `lags`).
+A lagged feature is the value that another feature, its source, had some rows earlier (`lags`).
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-#: How many rows a feature may look back.
+#: Maximum number of rows that a feature may look back.
 LARGEST_LAG = 20
 
-#: How many categories a message lists.
+#: Number of categories that a message lists.
 _LISTED = 3
 
 
@@ -33,7 +33,7 @@ class FeatureKind(Enum):
     CATEGORICAL = "categorical"
 
 
-#: Categories that are truth values, by the number that a topic carries for them.
+#: Categories that are truth values, and the number that a topic carries for each.
 TRUTH = {"False": 0.0, "True": 1.0}
 
 
@@ -42,21 +42,21 @@ class Feature:
     """A named column of the state.
 
     Raises:
-        ValueError: A categorical feature without categories, or another one with some; or a lagged
-            one that does not say where its source stands.
+        ValueError: A categorical feature has no categories, another one has some, or a lagged one
+            does not say where its source is.
     """
 
     name: str
     kind: FeatureKind = FeatureKind.NUMERIC
     categories: tuple[str, ...] = ()
-    """Of a categorical feature.  Those that come from a topic are numbers, written as text."""
+    """Of a categorical feature; numbers as text if they come from a topic."""
     topic: str | None = None
-    """State topic that carries the feature; None where it came from a table."""
+    """State topic that carries the feature; None if it came from a table."""
     index: int | None = None
-    """Position in the topic's array; of a lagged feature without a topic, its source's place in
-    the table."""
+    """Position in the topic's array; for a lagged feature without a topic, the position of its
+    source in the table."""
     lag: int = 0
-    """How many rows before it had this value; topic and index are those of its source."""
+    """How many rows earlier its source had this value; topic and index are the source's."""
 
     @property
     def examples(self) -> str:
@@ -79,7 +79,7 @@ class Feature:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where messages carry the value of a feature; of a lagged one, what it looks back at."""
+    """Where messages carry the value of a feature, or of a lagged feature's source."""
 
     topic: str
     index: int
@@ -91,7 +91,7 @@ def sources(features: Sequence[Feature], default_topic: str) -> tuple[Source, ..
 
     Args:
         features: All features of the tree.
-        default_topic: Topic of features that came from a table, in their order there.
+        default_topic: Topic of features that came from a table, in the order of the table.
     """
     return tuple(
         Source(feature.topic or default_topic, place if feature.index is None else feature.index)
@@ -100,11 +100,11 @@ def sources(features: Sequence[Feature], default_topic: str) -> tuple[Source, ..
 
 
 def codes_of(feature: Feature, *, coded: bool = False) -> dict[float, int]:
-    """The place of each category, by the number that messages carry for it.
+    """The position of each category, by the number that messages carry for it.
 
     Args:
-        feature: Any; one that is not categorical has none.
-        coded: Whether messages hold the places themselves.
+        feature: Any feature; if it is not categorical, the result is empty.
+        coded: Whether messages carry the positions themselves.
     """
     return {
         number: code
@@ -114,7 +114,7 @@ def codes_of(feature: Feature, *, coded: bool = False) -> dict[float, int]:
 
 
 def number_of(category: str) -> float | None:
-    """The number that a topic carries for a category; None where none does."""
+    """The number that a topic carries for a category; None if there is none."""
     if category in TRUTH:
         return TRUTH[category]
     try:

@@ -1,4 +1,4 @@
-"""The table that is learned from: all rows of one channel, with what was done before each."""
+"""The table to learn from: all rows of one channel, with what was done before each."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from rebt_ros.demonstration.last_action import (
 )
 from rebt_ros.demonstration.schema import TRUTH, Feature, FeatureKind
 from rebt_ros.demonstration.weights import whole_weights
-from rebt_ros.errors import InputError, OptionError
+from rebt_ros.errors import InputError, OptionError, listing
 
-#: Rows that are looked at before all of them are.
+#: How many rows are checked before all of them are.
 _FIRST_ROWS = 1000
-#: Names of features in a sentence.
+#: Number of features that a sentence names.
 _LISTED = 5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DemonstrationTable:
-    """Rows in the order in which they were shown, demonstration after demonstration."""
+    """Rows in the order in which they were shown, one demonstration after another."""
 
     channel: str
     features: tuple[Feature, ...]
@@ -43,21 +43,21 @@ class DemonstrationTable:
     demonstrations: tuple[str, ...]
     """Names of the demonstrations."""
     demonstration: IntArray
-    """Position in `demonstrations` of each row's one, ascending, shape (rows,)."""
+    """Position in `demonstrations` of each row's demonstration, ascending, shape (rows,)."""
     stamps: IntArray
     """Nanoseconds, shape (rows,)."""
     last: IntArray = field(init=False)
-    """Position in `actions` of each row's LAT, `NO_ACTION` where there is none, shape (rows,)."""
+    """Position in `actions` of each row's LAT, `NO_ACTION` for none, shape (rows,)."""
     before: IntArray | None = None
-    """LAT of each demonstration's first row, as in `last`, shape (demonstrations,); None: none."""
+    """LAT of each demonstration's first row, as in `last`, shape (demonstrations,), or None."""
     previous: IntArray = None  # type: ignore[assignment]
-    """Position in `actions` of the action of the row before, `NO_ACTION` in a demonstration's first
-    row, shape (rows,); None to derive it from `chosen`."""
+    """Position in `actions` of the previous row's action, `NO_ACTION` in the first row of a
+    demonstration, shape (rows,); None to derive it from `chosen`."""
     row_kind: RowKind = RowKind.EVENT
     weights: IntArray | None = None
-    """How often the rows of each demonstration count, shape (demonstrations,); None: once."""
+    """How often the rows of each demonstration count, shape (demonstrations,); None for once."""
     robot: object = None
-    """The `RobotFile` by which its rows were read, for trees to carry; None without one."""
+    """The `RobotFile` that its rows were read with, for trees to carry; None without one."""
 
     def __post_init__(self) -> None:
         if self.previous is None:
@@ -71,17 +71,17 @@ class DemonstrationTable:
 
     @property
     def row_weights(self) -> IntArray | None:
-        """How often each row counts, shape (rows,); None: once."""
+        """How often each row counts, shape (rows,); None for once."""
         return None if self.weights is None else self.weights[self.demonstration]
 
     def counts(
         self, codes: IntArray, least: int, rows: BoolArray | slice = slice(None)
     ) -> IntArray:
-        """How often each code is that of a row, by the weights of the rows, shape (codes,).
+        """The weighted number of rows with each code, shape (codes,).
 
         Args:
-            codes: Of some rows, shape (some,).
-            least: So many codes at least.
+            codes: Codes of some rows, shape (some,).
+            least: Minimum number of codes.
             rows: Which rows these are.
         """
         weights = self.row_weights
@@ -90,12 +90,12 @@ class DemonstrationTable:
         return np.bincount(codes, weights[rows], least).astype(np.int64)
 
     def where(self, rows: BoolArray) -> DemonstrationTable:
-        """The table of some rows only.
+        """The table of some of the rows.
 
-        The previous action is that of the whole table.  LAT is derived anew: a part that begins
-        inside a demonstration begins without one.
+        Previous actions are those of the whole table.  LAT is derived again: a part that begins in
+        the middle of a demonstration begins without one.
         """
-        # Rows that stand together are not copied: tables can be large.
+        # Contiguous rows are not copied, since tables can be large.
         part = _stretch(rows)
         return replace(
             self,
@@ -108,7 +108,7 @@ class DemonstrationTable:
         )
 
     def last_where(self, rows: BoolArray) -> IntArray:
-        """LAT in the table of some rows only (see `where`), which is not made."""
+        """LAT in the table of some rows (see `where`), without making that table."""
         return last_actions(self.chosen[rows], self.demonstration[rows], self._before_parts(rows))
 
     def _before_parts(self, rows: BoolArray) -> IntArray | None:
@@ -120,10 +120,10 @@ class DemonstrationTable:
         return before
 
     def held_out(self, fraction: float) -> BoolArray:
-        """Which rows to test on rather than to learn from, shape (rows,).
+        """Which rows to test on instead of learning from them, shape (rows,).
 
-        The last rows where there is one demonstration; whole demonstrations, the last ones, where
-        there are several, so that no row is tested whose neighbors were learned from.
+        These are the last rows of a single demonstration, or the last ones of several
+        demonstrations as a whole: no row is tested whose neighbors were learned from.
 
         Args:
             fraction: Share of the rows to hold out, in [0, 1), as nearly as whole demonstrations
@@ -134,26 +134,26 @@ class DemonstrationTable:
             return np.zeros(len(self), dtype=bool)
         if len(shown) == 1:
             return np.arange(len(self)) >= _share_kept(len(self), fraction)
-        # Where each demonstration but the first begins, from the last one back.
+        # Where each demonstration but the first begins, the last one first.
         begins = np.searchsorted(self.demonstration, shown[:0:-1])
         nearest = np.argmin(np.abs(len(self) - begins - fraction * len(self)))
         return np.arange(len(self)) >= int(begins[nearest])
 
 
 def _stretch(rows: BoolArray) -> BoolArray | slice:
-    """The rows as a slice, if they stand together."""
+    """The rows as a slice, if they are contiguous."""
     chosen = int(np.count_nonzero(rows))
     first = int(np.argmax(rows)) if chosen else 0
     return slice(first, first + chosen) if rows[first : first + chosen].all() else rows
 
 
 def _share_kept(count: int, fraction: float) -> int:
-    # The tolerance keeps the rounding of, say, 100 * 0.07 from holding out one more.
+    # The tolerance keeps the rounding of, say, 100 * 0.07 from adding a row.
     return min(max(count - math.ceil(count * fraction - 1e-9), 1), count - 1)
 
 
 def history_at(table: DemonstrationTable, row: int) -> ActionHistory:
-    """What was done before a row, as far as its demonstration tells."""
+    """What was done before a row in its demonstration."""
 
     def label(code: int) -> str | None:
         return None if code == NO_ACTION else table.actions[code]
@@ -171,9 +171,9 @@ def history_at(table: DemonstrationTable, row: int) -> ActionHistory:
 
 
 def part_of(table: DemonstrationTable, rows: int) -> DemonstrationTable:
-    """About so many rows: whole demonstrations, evenly spread, or the first rows of the only one.
+    """About this many rows: whole demonstrations, evenly spread, or the first rows of the only one.
 
-    All where there are no more.
+    All rows if there are no more.
     """
     if len(table) <= rows:
         return table
@@ -193,14 +193,14 @@ def tabulate(
 
     Args:
         demonstrations: At least one; all with the same features in the same order.
-        declared: Kinds of features by name.  A feature that is not declared and holds nothing but
-            0 and 1, and both of them, is binary; otherwise it stays what it is.
-        weights: How much each demonstration counts, above 0; empty: all alike.
+        declared: Kinds of features by name.  A feature that is not declared is binary if its values
+            are 0 and 1, and both occur; otherwise it keeps its kind.
+        weights: How much each demonstration counts, above 0; empty if all count the same.
 
     Raises:
-        InputError: No rows, or demonstrations whose features or kinds of rows differ.
-        OptionError: A declared feature does not exist or does not hold such values, or weights are
-            too large (see `whole_weights`).
+        InputError: There are no rows, or features or kinds of rows differ among demonstrations.
+        OptionError: A declared feature does not exist or holds other values, or weights are too
+            large (see `whole_weights`).
     """
     whole = whole_weights(
         [weight for weight, one in zip(weights, demonstrations, strict=True) if len(one)]
@@ -257,7 +257,7 @@ def _channel_table(
     return DemonstrationTable(
         channel,
         features,
-        # The only copy is the one that was made when states were joined.
+        # The only copy is the one made when states were joined.
         states if everywhere.all() else rows_of(states, everywhere),
         actions,
         chosen,
@@ -277,7 +277,7 @@ def _rows_of(channel: str, demonstration: Demonstration) -> BoolArray:
 def _joined_labels(
     labels: Sequence[tuple[str, ...]], codes: Sequence[IntArray]
 ) -> tuple[tuple[str, ...], IntArray]:
-    """Columns of strings as one; only the labels that occur, sorted.
+    """Joined columns of strings, with only the labels that occur, sorted.
 
     >>> _joined_labels([("b", "c"), ("a", "b")], [np.array([0, 0]), np.array([1, 0])])
     (('a', 'b'), array([1, 1, 1, 0]))
@@ -302,7 +302,7 @@ def _joined_labels(
 def _before(
     channel: str, demonstrations: Sequence[Demonstration], actions: Sequence[str]
 ) -> IntArray | None:
-    """LAT of each demonstration's first row; of what nobody ever showed, there is no condition."""
+    """LAT of each demonstration's first row; none if it is an action that nobody showed."""
     known = {action: code for code, action in enumerate(actions)}
     codes = [
         known.get(demonstration.before.get(channel, ""), NO_ACTION)
@@ -313,10 +313,6 @@ def _before(
         if any(demonstration.before for demonstration in demonstrations)
         else None
     )
-
-
-def _shortened(names: Sequence[str]) -> str:
-    return ", ".join([*names[:_LISTED], *(["…"] if len(names) > _LISTED else [])])
 
 
 def _joined_states(
@@ -330,8 +326,8 @@ def _joined_states(
             if not differing:
                 raise InputError(
                     f"{first.name} and {other.name} have the same features in different orders "
-                    f"({_shortened(mine)}; {_shortened(its)}): record them in one order, or learn "
-                    "from those of one order."
+                    f"({listing(mine, _LISTED)}; {listing(its, _LISTED)}): record them in one "
+                    "order, or learn from those of one order."
                 )
             raise InputError(
                 f"{first.name} and {other.name} have different features "
@@ -359,7 +355,7 @@ def _joined_states(
 
 
 def _telling(place: int, demonstrations: Sequence[Demonstration]) -> tuple[Feature, ...]:
-    """A feature as the demonstrations have it in which it ever has a value; at least one."""
+    """The feature as in the demonstrations in which it has values; at least one."""
     found = [
         demonstration.features[place]
         for demonstration in demonstrations
@@ -369,13 +365,13 @@ def _telling(place: int, demonstrations: Sequence[Demonstration]) -> tuple[Featu
 
 
 def _unified(first: Feature, *others: Feature) -> Feature:
-    """One feature that holds the values of the same feature in several demonstrations."""
+    """A feature that holds the values of the same feature in several demonstrations."""
     kinds = {one.kind for one in (first, *others)}
     if FeatureKind.CATEGORICAL not in kinds:
         return first if kinds == {first.kind} else replace(first, kind=FeatureKind.NUMERIC)
     categories = {name for one in (first, *others) for name in one.categories}
     if kinds == {FeatureKind.BINARY, FeatureKind.CATEGORICAL} and categories <= TRUTH.keys():
-        # The same truth values, with gaps in one of the demonstrations.
+        # Both are truth values, with gaps in one of the demonstrations.
         return replace(first, kind=FeatureKind.CATEGORICAL, categories=tuple(TRUTH))
     if kinds != {FeatureKind.CATEGORICAL}:
         raise InputError(
@@ -387,7 +383,7 @@ def _unified(first: Feature, *others: Feature) -> Feature:
 
 def _recoded(column: FloatArray, mine: Feature, unified: Feature) -> FloatArray:
     if mine.categories == unified.categories or mine.kind is FeatureKind.BINARY:
-        # 0 and 1 are the positions of false and true as well.
+        # 0 and 1 are also the positions of false and true.
         return column
     position = np.array([unified.categories.index(name) for name in mine.categories], dtype=float)
     known = ~np.isnan(column)
@@ -399,7 +395,7 @@ def _recoded(column: FloatArray, mine: Feature, unified: Feature) -> FloatArray:
 def _with_kinds(
     features: tuple[Feature, ...], states: FloatArray, declared: Mapping[str, FeatureKind]
 ) -> tuple[tuple[Feature, ...], FloatArray]:
-    """The features with their kinds, and the same states, in which categories become positions."""
+    """The features with their kinds, and the states with categories as positions."""
     unknown = sorted(set(declared) - {feature.name for feature in features})
     if unknown:
         raise OptionError(
@@ -431,8 +427,8 @@ def _with_kinds(
 
 
 def _is_binary(column: FloatArray) -> bool:
-    """Whether there is nothing but 0 and 1, and both of them, where it is not missing."""
-    # Almost always the first rows tell.
+    """Whether all known values are 0 or 1, and both occur."""
+    # The first rows almost always tell.
     for rows in (column[:_FIRST_ROWS], column):
         truth = (rows == 0) | (rows == 1)
         if not (truth | np.isnan(rows)).all():
@@ -451,7 +447,7 @@ def _check_kind(feature: Feature, kind: FeatureKind, values: FloatArray) -> None
 
 
 def category(value: float) -> str:
-    """How a number names a category.
+    """The name of a category that is a number.
 
     >>> category(3.0), category(0.5)
     ('3', '0.5')

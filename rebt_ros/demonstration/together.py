@@ -1,4 +1,4 @@
-"""What a person should know about demonstrations that are learned from together."""
+"""What a person should know about several demonstrations to learn from."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rebt_ros.demonstration.valueless import valueless
 
 
 def notes_together(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
-    """Notes that no demonstration gives alone: what they repeat, and what none or only some have.
+    """Notes on all demonstrations together: what they repeat, and what some or all of them lack.
 
     >>> list(notes_together([]))
     []

@@ -1,4 +1,4 @@
-"""Features of messages that have no value in a whole demonstration."""
+"""Features of messages that have no value in an entire demonstration."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.errors import listing
 
-#: So many demonstrations are named.
+#: Number of demonstrations that a note names.
 _NAMED = 3
 
 
 def valueless(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
-    """Notes on features that are read from messages and are missing in all rows of some.
+    """Notes on features that are read from messages and missing in all rows of a demonstration.
 
-    A path may be right and lead to nothing: a misspelled joint, an index or an angle beyond the
-    ends of an array, values that are none of the feature's categories.
+    A valid path may lead to nothing: a misspelled joint, an index or angle beyond the ends of an
+    array, values that are not among the feature's categories.
 
     >>> list(valueless([]))
     []
@@ -32,7 +33,7 @@ def valueless(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
         if len(those) == len(demonstrations):
             where = "in any row"
         else:
-            named = ", ".join(those[:_NAMED]) + (", …" if len(those) > _NAMED else "")
+            named = listing(those, _NAMED)
             where = f"in {len(those)} of {len(demonstrations)} demonstrations ({named})"
         yield (
             f"feature {name!r} has no value {where}: see whether its path, kind and categories fit "

@@ -1,7 +1,7 @@
 """Weights of demonstrations: how often each of their rows counts.
 
-Weights are ratios.  They are brought to the smallest whole numbers, so that counts of rows stay
-counts, and equal ones are as good as none.
+Weights are ratios.  They are reduced to the smallest whole numbers: counts of rows remain counts,
+and equal weights have no effect.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from rebt_ros.arrays import IntArray
 from rebt_ros.errors import OptionError
 
-#: Largest whole number that weights may come to.
+#: Maximum of the whole numbers.
 LARGEST_WEIGHT: Final = 1000
 
 
@@ -27,7 +27,7 @@ def whole_weights(weights: Sequence[Fraction]) -> IntArray | None:
         weights: Above 0.
 
     Raises:
-        OptionError: They are too large.
+        OptionError: The whole numbers are too large.
 
     >>> whole_weights([Fraction(1), Fraction("0.5"), Fraction(3)])
     array([2, 1, 6])

@@ -81,14 +81,19 @@ def summary(inspection: Inspection) -> str:
         f"{count} demonstration{'s' * (count != 1)} with {inspection.rows} rows "
         f"({inspection.row_kind}s) of {len(inspection.features)} "
         f"feature{'s' * (len(inspection.features) != 1)}; "
-        f"{inspection.contradicting} rows contradict others."
+        f"{_rows_contradict(inspection.contradicting)} others."
     )
+
+
+def _rows_contradict(rows: int) -> str:
+    return "1 row contradicts" if rows == 1 else f"{rows} rows contradict"
 
 
 def findings(inspection: Inspection) -> Iterator[str]:
     """What is worth a look, most general first; no full stops."""
     if inspection.constant:
-        yield f"never vary in any demonstration: {_named(inspection.constant)}"
+        varies = "varies" if len(inspection.constant) == 1 else "vary"
+        yield f"never {varies} in any demonstration: {_named(inspection.constant)}"
     for one in inspection.demonstrations:
         for finding in findings_of(one, inspection):
             yield f"{one.name}: {finding}"
@@ -116,12 +121,13 @@ def findings_of(inspected: Inspected, inspection: Inspection) -> Iterator[str]:
         yield f"nothing changes for {span} at {where}" + _and_more(inspected.idle)
     steady = [name for name in inspected.constant if name not in inspection.constant]
     if steady and len(inspection.demonstrations) > 1:
-        yield f"never vary here, though elsewhere: {_named(steady)}"
+        varies, does = ("varies", "does") if len(steady) == 1 else ("vary", "do")
+        yield f"never {varies} here, but {does} elsewhere: {_named(steady)}"
     if inspected.contradicting.examples:
         first = inspected.contradicting.examples[0]
         yield (
-            f"{inspected.contradicting.rows} rows contradict others, "
-            f"{inspected.contradicting.outvoted} of them most others; such as row {first.row} "
+            f"{_rows_contradict(inspected.contradicting.rows)} others "
+            f"({inspected.contradicting.outvoted} of them outvoted), such as row {first.row} "
             f"({name_text(first.action)}) and row {first.other_row} of {first.demonstration} "
             f"({name_text(first.other)})"
         )

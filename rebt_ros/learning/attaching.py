@@ -1,4 +1,4 @@
-"""Accepting suggestions: attached subtrees, and PSA nodes as the user wants them."""
+"""Accepting suggestions: attaching subtrees, and resolving PSA nodes."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from rebt_ros.paper.rule_trees import with_root
 def accept(
     tree: nodes.Node, suggestions: tuple[Suggestion, ...], options: LearnOptions
 ) -> tuple[nodes.Node, tuple[Suggestion, ...]]:
-    """The tree with what the user attaches, its PSA nodes as the user wants them.
+    """The tree with the subtrees that the user attaches, and PSA nodes resolved as requested.
 
-    In the paper's mode subtrees are attached as printed.  Otherwise they come before the rules,
-    which cover every state, and a Sequence goes on when a loop in it has ended.
+    In the paper's mode, subtrees are attached as printed.  Otherwise they come before the rules,
+    which cover every state, and a Sequence continues after a loop in it has ended.
 
     Raises:
-        OptionError: There is no suggestion with such an id.
+        OptionError: There is no suggestion with this id.
     """
     if options.attach:
         printed = options.is_paper
@@ -38,10 +38,10 @@ def accept(
 
 
 def mark(suggestions: Iterable[Suggestion], ids: Iterable[str]) -> tuple[Suggestion, ...]:
-    """The suggestions, those with the given ids (or all, for `ALL`) said to be attached.
+    """The suggestions; those with the given ids (all, for `ALL`) are marked as attached.
 
     Raises:
-        OptionError: There is no suggestion with such an id.
+        OptionError: There is no suggestion with this id.
     """
     suggestions, wanted = tuple(suggestions), set(ids)
     unknown = sorted(wanted - {suggestion.id for suggestion in suggestions} - {ALL})
@@ -49,7 +49,7 @@ def mark(suggestions: Iterable[Suggestion], ids: Iterable[str]) -> tuple[Suggest
         known = ", ".join(suggestion.id for suggestion in suggestions)
         raise OptionError(
             f"there is no suggestion {unknown[0]!r} to attach: "
-            + (f"choose of {known}, or {ALL}." if known else "nothing was suggested.")
+            + (f"choose one of {known}, or {ALL}." if known else "nothing was suggested.")
         )
     return tuple(
         replace(
@@ -71,15 +71,15 @@ def attach(
 
     Args:
         tree: The main tree.
-        suggestions: What there is; those that are marked as attached are in the tree already.
-        ids: Which of them to attach, whatever the order; `ALL` for all.
-        root: Kind of the root to put over a main tree that is a single rule.
-        in_front: Whether they come before the rules instead of behind them, as in the paper.
-            Under a Selector root the rules cover every state, so that what stands behind them is
-            reached only when an action fails.
+        suggestions: All suggestions; those marked as attached are already in the tree.
+        ids: Which of them to attach, in any order; `ALL` for all.
+        root: Kind of the root that a main tree of a single rule gets.
+        in_front: Whether they come before the rules, instead of after them as in the paper.  Under
+            a Selector root the rules cover every state, so what follows them is reached only when
+            an action fails.
 
     Raises:
-        OptionError: There is no suggestion with such an id.
+        OptionError: There is no suggestion with this id.
     """
     suggestions = tuple(suggestions)
     subtrees = tuple(
@@ -95,7 +95,7 @@ def attach(
 
 
 def resolve(tree: nodes.Node, choice: PsaChoice) -> nodes.Node:
-    """The tree with every PSA node turned into what the user chose."""
+    """The tree with every PSA node turned into the node that the user chose."""
     children = tuple(resolve(child, choice) for child in nodes.children(tree))
     match tree:
         case nodes.ParallelSelector():
@@ -106,12 +106,12 @@ def resolve(tree: nodes.Node, choice: PsaChoice) -> nodes.Node:
 
 
 def going_on_after_loops(tree: nodes.Node) -> nodes.Node:
-    """The tree in which a Sequence goes on when a Repeater in it has ended.
+    """The tree, with Sequences that continue after a Repeater in them has ended.
 
-    A Repeater ends by failing, and with it fails the Sequence around it (paper, III-B), so that the
-    steps behind the Repeater are never reached.  Here an Inverter stands over each Repeater that
-    something follows in a Sequence, or in the next pass of another Repeater.  A loop whose first
-    condition fails at once then counts as ended, too.
+    A Repeater ends by failing, and so does the Sequence around it (paper, III-B): the steps after
+    the Repeater are never reached.  So each Repeater that is followed by something, in a Sequence
+    or in the next pass of another Repeater, gets an Inverter.  A loop whose first condition fails
+    at once then counts as ended too.
     """
     children = tuple(going_on_after_loops(child) for child in nodes.children(tree))
     match tree:

@@ -1,17 +1,17 @@
-"""Choosing what to learn: the pruning level, what a tree may test beside the features, PSA nodes.
+"""Choosing what to learn: the pruning level, what a tree may test besides features, PSA nodes.
 
-What cross-validation decides, it decides on rows that a tree was not learned from:
+Cross-validation judges on rows that a tree was not learned from.  These are the choices:
 
-- whether the tree may test the previous action: where that makes the explanation of the rows much
-  simpler (see `FittedTree.explanation`), whatever cross-validation says; where explanations are
-  equally large, by the size of the behavior trees, then by fewer comparisons of numbers; or where
-  it makes the explanation no larger and raises the mean recall of unpruned trees after their own
-  choices; of events that are sent when the action changes, which always differ from the
-  one before, only where states hardly tell what to do;
-- whether it may test weighted sums of features: where they make the description of the rows shorter
-  (see `weighted_sums`), unless that costs both agreement and mean recall;
+- whether the tree may test the previous action.  It may if this makes the explanation of the rows
+  much simpler (see `FittedTree.explanation`), whatever cross-validation says.  Between explanations
+  of equal size, the size of the behavior trees decides, then the number of comparisons.  Otherwise
+  it may if the explanation is no larger and the mean recall of unpruned trees after their own
+  choices is higher.  Events that are sent when the action changes always differ from the previous
+  one; there it may only if states hardly determine what to do;
+- whether it may test weighted sums of features: if they shorten the description of the rows (see
+  `weighted_sums`), unless that costs both agreement and mean recall;
 - whether it may test differences of features, by agreement and size;
-- the pruning level, by mean recall, and by the size of the explanation where that leaves much open:
+- the pruning level, by mean recall, and by the size of the explanation if recall leaves much open:
   pruning has to pay (see `judged_levels`);
 - PSA nodes, by own-history agreement.
 
@@ -51,30 +51,30 @@ from rebt_ros.learning.structure import structure_sample
 from rebt_ros.logic.conditions import Difference
 from rebt_ros.paper.rules import delta_close
 
-#: With fewer rows the folds are too small to tell anything.
+#: With fewer rows, the folds are too small to judge anything.
 _FEWEST_ROWS = 20
 
-#: Of larger tables, so many rows, by whole demonstrations, tell what a tree may test; the level is
-#: chosen by all.
+#: In larger tables, about this many rows, in whole demonstrations, decide what a tree may test; all
+#: rows choose the level.
 _LARGE, _ROWS_THAT_TELL = 6_000, 2_000
 
-#: To which share the previous action has to bring the size of the explanation.
+#: Factor by which the previous action has to shrink the explanation.
 _MUCH_SIMPLER = 0.875
 
-#: Share of events up to which it is hardly ever that an action follows itself.
+#: Up to this share of events, an action hardly ever follows itself.
 _HARDLY = 0.1
 
-#: How much agreement differences may cost, and to which share of the leaves they have to come.
-#: Weighted sums may cost as much agreement or as much mean recall.
+#: How much agreement differences may cost, and by which factor they have to reduce the leaves.
+#: Weighted sums may cost the same amount of agreement or of mean recall.
 _DEARER, _SMALLER = 0.005, 0.75
 
-#: Steps of six cross-validations, of running the trees of two, and of running them with PSA nodes
-#: and without.
+#: Steps of six cross-validations, of running the trees of two of them, and of running them with and
+#: without PSA nodes.
 _MOST_STEPS = 6 * (MOST_FOLDS + 1) + 2 * MOST_FOLDS + 2 * MOST_FOLDS
 
 
 class _Steps:
-    """Counts steps of the work and tells which share of it is behind at most."""
+    """Counts steps of the work, and reports at most which share of it is done."""
 
     def __init__(self, advance: Callable[[float], None]) -> None:
         self._advance = advance
@@ -94,13 +94,13 @@ def choose(
     """Chooses a policy.
 
     Args:
-        table: By its rows alone.
+        table: The rows.
         options: What is left to choose.
-        advance: Told which share of the work is behind; there may be less of it.
-        held_out: Rows that have no say, shape (rows,).
+        advance: Called with the share of the work that is done; there may be less work.
+        held_out: Rows that are not used, shape (rows,).
 
     Raises:
-        OptionError: There is no such pruning level as is asked for.
+        OptionError: The requested pruning level does not exist.
     """
     choice = _Choice(table, options, _Steps(advance), held_out)
     if len(table) < _FEWEST_ROWS:
@@ -118,7 +118,7 @@ def choose(
         other = simplest(choice.shown, fitted)
         its = _of_another_fit(fitted, ccp_alpha, other, options)
         asked = _asked_for(fitted, options) is not None
-        # Where it is pruned, what it says of mistakes is not what makes it simple.
+        # If it is pruned, its size before pruning is not what makes it simple.
         if other is not fitted and (asked or _leaves(other, its) <= _leaves(fitted, ccp_alpha)):
             reasons.append(
                 f"Of the trees that fit the rows, one with {_size(other)} is the simplest "
@@ -129,13 +129,13 @@ def choose(
 
 
 def _asked_for(fitted: FittedTree, options: LearnOptions) -> float | None:
-    """The ``ccp_alpha`` that the options come to; None where it is left to choose."""
+    """The ``ccp_alpha`` that the options ask for; None if it is left to choose."""
     if options.level is None:
         return options.ccp_alpha
     if options.level >= len(fitted.path):
         raise OptionError(
             f"there is no pruning level {options.level}: the last one is {len(fitted.path) - 1}, "
-            "a tree that does one thing whatever happens."
+            "a tree that always does the same."
         )
     return float(fitted.path.alphas[options.level])
 
@@ -143,7 +143,7 @@ def _asked_for(fitted: FittedTree, options: LearnOptions) -> float | None:
 def _level(levels: JudgedLevels, shown: DemonstrationTable) -> tuple[float, str]:
     """The ``ccp_alpha`` to prune at, and why."""
     begun = int(np.count_nonzero(shown.previous != shown.chosen))
-    # Stretches of one demonstration may each be a part of the task that no other one shows.
+    # Each stretch of a demonstration may be a part of the task that no other stretch shows.
     if len(np.unique(shown.demonstration)) == 1 and begun < levels.shown.size:
         return 0.0, (
             f"One demonstration in which actions are begun {begun} times does not tell how far to "
@@ -170,16 +170,16 @@ def _level(levels: JudgedLevels, shown: DemonstrationTable) -> tuple[float, str]
 def _of_another_fit(
     judged: FittedTree, ccp_alpha: float, fitted: FittedTree, options: LearnOptions
 ) -> float:
-    """Where to prune another fit to the same rows than the one whose levels were judged."""
+    """Where to prune another fit to the same rows, given a judged fit and its level."""
     asked = _asked_for(fitted, options)
-    # Its levels lie elsewhere: what was chosen is the range up to the next one.
+    # Its levels are elsewhere: the choice stands for the range up to the next level.
     return judged.path.middle(ccp_alpha) if asked is None else asked
 
 
 def _unjudged(table: DemonstrationTable, options: LearnOptions, choice: _Choice) -> ChosenPolicy:
-    """Without cross-validation: no pruning, and PSA only where it is asked for.
+    """Without cross-validation: no pruning, and PSA nodes only on request.
 
-    The previous action is tested where that makes the explanation simpler.
+    The previous action is tested if that makes the explanation simpler.
     """
     history = choice.history_of_explanations()
     fitted = fit(table, fit_options(options, Vocabulary(history)))
@@ -204,9 +204,9 @@ def _in_words(explanations: tuple[int, int]) -> str:
 
 
 def _always_changes(table: DemonstrationTable) -> bool:
-    """Whether rows are events in which hardly an action follows itself, as where changes are sent.
+    """Whether rows are events in which an action hardly ever follows itself: changes of action.
 
-    The tree is ticked while an action lasts; these rows do not show how long that is.
+    The tree is ticked while an action lasts; these rows do not show for how long.
     """
     if table.row_kind is not RowKind.EVENT:
         return False
@@ -215,7 +215,7 @@ def _always_changes(table: DemonstrationTable) -> bool:
 
 
 def _simpler(first: FittedTree, second: FittedTree) -> bool:
-    """Whether a tree takes fewer comparisons of numbers than another one, and no more leaves."""
+    """Whether the first tree has fewer comparisons of numbers, and no more leaves."""
     return first.leaves <= second.leaves and first.comparisons < second.comparisons
 
 
@@ -232,7 +232,7 @@ class _Choice:
         self._table, self._options, self._step = table, options, step
         self._held_out = held_out
         self.shown = table if held_out is None else table.where(~held_out)
-        """The rows to choose by."""
+        """The rows that choose."""
         self._sample = structure_sample(table, options)
         large = len(self.shown) > _LARGE
         self._telling = part_of(self.shown, _ROWS_THAT_TELL) if large else self.shown
@@ -241,7 +241,7 @@ class _Choice:
         self.reasons: list[str] = []
 
     def judged(self, vocabulary: Vocabulary, *, telling: bool = False) -> CrossValidation:
-        """Of all rows, or of those that tell what a tree may test."""
+        """The cross-validation of all rows, or of those that decide what a tree may test."""
         telling = telling and self._telling is not self.shown
         key = telling, vocabulary
         if key not in self._made:
@@ -255,20 +255,20 @@ class _Choice:
         return self._made[key]
 
     def vocabulary(self) -> Vocabulary:
-        """What the tree may test beside the features."""
+        """What the tree may test besides features."""
         states_alone = self._with_sums(FEATURES_ALONE)
         vocabulary = replace(states_alone, history=self._history(states_alone))
         if not vocabulary.combinations and vocabulary.history is not History.NONE:
-            # Where the same states ask for different actions, a line between them shows late.
+            # If equal states have different actions, a line between these shows only with history.
             vocabulary = self._with_sums(vocabulary)
         return self._with_differences(vocabulary)
 
     def _with_sums(self, vocabulary: Vocabulary) -> Vocabulary:
-        """With the weighted sums that are worth it."""
+        """The vocabulary with the weighted sums that are worth it."""
         options = self._options
         if options.sums is Use.NEVER:
             return vocabulary
-        # What a difference says needs no weights.
+        # A difference needs no weights.
         at_hand = vocabulary.with_more(self._likely_differences(vocabulary))
         how = replace(fit_options(options, at_hand), upsample=Upsampling.NONE)
         sums = likely_sums(self._telling, fit(self._telling, how), how)
@@ -276,8 +276,8 @@ class _Choice:
         if not sums or options.sums is Use.ALWAYS:
             return with_them
         choices = partial(own_history_choices, options=options, psa=False)
-        # Lines were drawn through the rows of all folds, which flatters them a little: this holds
-        # back only what is worse all the same.
+        # Lines were fitted to the rows of all folds, which flatters them a little: this rejects
+        # only sums that are worse nevertheless.
         before, after = (
             self.judged(one, telling=True).levels(choices) for one in (vocabulary, with_them)
         )
@@ -367,11 +367,11 @@ class _Choice:
         return None, ""
 
     def _history_of_changes(self, states_alone: Vocabulary, compared: str) -> History:
-        """Where the action of each row is another one than the previous action.
+        """Whether to test the previous action if each row has another action than the one before.
 
-        That is a part of what each row does, whatever the state: of two actions, all of it.  So the
-        size of an explanation by it tells nothing, and it is tested only where states hardly tell
-        what to do.
+        The previous action then reveals something about each row whatever the state; with two
+        actions, everything.  So the size of the explanation says nothing, and the previous action
+        is tested only if states hardly determine what to do.
         """
         without, recall = (levels.mean_recalls[0] for levels in self._unpruned(states_alone))
         by_chance = 1 / len(np.unique(self._telling.chosen))
@@ -385,7 +385,7 @@ class _Choice:
         return History.PREVIOUS if tested else History.NONE
 
     def _unpruned(self, states_alone: Vocabulary) -> tuple[JudgedLevels, JudgedLevels]:
-        """What unpruned trees are worth, by states alone and with the previous action."""
+        """How good unpruned trees are, by states alone and with the previous action."""
         without, with_it = (
             self.judged(vocabulary, telling=True).unpruned()
             for vocabulary in (states_alone, replace(states_alone, history=History.PREVIOUS))
@@ -393,11 +393,11 @@ class _Choice:
         return without, with_it
 
     def _fitted(self, vocabulary: Vocabulary) -> FittedTree:
-        """Fitted to the rows that tell what a tree may test."""
+        """A tree fitted to the rows that decide what a tree may test."""
         return fit(self._telling, fit_options(self._options, vocabulary))
 
     def _sizes(self, *fits: FittedTree) -> tuple[int, ...]:
-        """Nodes of the behavior trees that are not pruned; 0 for all where one is very large."""
+        """Sizes of the unpruned behavior trees; 0 for all if one of them is very large."""
         if any(fitted.leaves > MOST_LEAVES_BY_DOMAIN for fitted in fits):
             return (0,) * len(fits)
         trees = (
@@ -417,7 +417,7 @@ class _Choice:
         return self._likely[vocabulary]
 
     def _with_differences(self, vocabulary: Vocabulary) -> Vocabulary:
-        """With the differences that are worth it."""
+        """The vocabulary with the differences that are worth it."""
         options = self._options
         differences = self._likely_differences(vocabulary)
         more = vocabulary.with_more(differences)
@@ -431,8 +431,8 @@ class _Choice:
         leaves = [
             int(count[levels.chosen]) for count, levels in zip(counts, (before, after), strict=True)
         ]
-        # Pruned trees can differ in size because one of them is pruned more: what differences say
-        # in one test instead of many shows before pruning, too.
+        # Pruned trees can differ in size because one of them is pruned more.  If differences
+        # replace many tests by one, unpruned trees differ too.
         smaller = all(
             one <= _SMALLER * other
             for one, other in ((leaves[1], leaves[0]), (counts[1][0], counts[0][0]))

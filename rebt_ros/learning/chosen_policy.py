@@ -1,4 +1,4 @@
-"""What was chosen to learn, and why."""
+"""The choices made for a policy, and their reasons."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from rebt_ros.learning.judged_levels import JudgedLevels
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ChosenPolicy:
-    """What was chosen, and why."""
+    """A chosen tree, and why it was chosen."""
 
     fitted: FittedTree
     ccp_alpha: float
     psa: bool
-    """Whether PSA nodes stand in the tree."""
+    """Whether the tree has PSA nodes."""
     levels: JudgedLevels | None
-    """The pruning levels that were chosen from; None where there was no choice."""
+    """The pruning levels to choose from; None without a choice."""
     reasons: tuple[str, ...]
     """A sentence for each choice."""
     of_all: FittedTree | None = None
-    """The tree of all rows, also of those that were held out; None where none was chosen by."""
+    """The tree of all rows, including those held out; None without cross-validation."""

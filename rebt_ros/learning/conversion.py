@@ -1,4 +1,4 @@
-"""From a decision tree to the behavior tree that the options ask for, and to its choices."""
+"""From a decision tree to the requested behavior tree, and to its choices."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from rebt_ros.paper.rules import delta_close, dt_to_rules, dt_to_rules_psa, leaf
 
 
 def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.Node:
-    """The behavior tree that does in every state what a decision tree does.
+    """The behavior tree that does what a decision tree does, in every state.
 
     Raises:
-        OptionError: The root asked for makes no sense.
+        OptionError: The requested root makes no sense.
     """
     dt, delta = trained.tree, options.delta
     if options.reductions is None:
@@ -32,9 +32,9 @@ def convert(trained: TrainedTree, options: LearnOptions, *, psa: bool) -> nodes.
 
 
 def leaves_out_conditions(trained: TrainedTree, options: LearnOptions) -> bool:
-    """Whether a tree does without the conditions that no shown row needs.
+    """Whether conditions that no shown row needs are left out of a tree.
 
-    What a condition on LAT means depends on the rule that asks, which no row tells.
+    The meaning of a condition on LAT depends on the rule that tests it, which rows do not tell.
     """
     reductions = options.reductions
     by_priority = reductions is not None and reductions.priority and options.root is Root.SELECTOR
@@ -49,9 +49,9 @@ def convert_shown(
 
     Args:
         trained: The decision tree.
-        options: They say whether such conditions are left out.
+        options: Whether such conditions are left out.
         shown: The rows that it was learned from.
-        psa: Whether PSA nodes stand in it.
+        psa: Whether it has PSA nodes.
     """
     tree = convert(trained, options, psa=psa)
     if not leaves_out_conditions(trained, options):
@@ -60,9 +60,9 @@ def convert_shown(
 
 
 def kept_rows(trained: TrainedTree, shown: DemonstrationTable, *, psa: bool) -> BoolArray:
-    """In which rows leaving out conditions changes nothing, shape (rows,).
+    """Rows in which leaving out conditions changes nothing, shape (rows,).
 
-    A row that the decision tree gets wrong speaks for none of its conditions.
+    A row that the decision tree gets wrong is no reason to keep a condition.
     """
     if psa:
         return np.ones(len(shown), dtype=bool)
@@ -74,8 +74,9 @@ def own_history_choices(
 ) -> IntArray:
     """What the behavior tree of a decision tree chooses after its own choices.
 
-    It need not be made, which takes long, unless LAT or PSA nodes come with a history: it chooses
-    what the leaf of the decision tree does, or the best supported one of the leaf's PSA group.
+    Making the behavior tree takes long, and is needed only for LAT, or for PSA nodes with a
+    history.  Otherwise it chooses what the decision tree's leaf does, or the best supported action
+    of the leaf's PSA group.
     """
     history = trained.vocabulary.history
     if history is History.LAST or (psa and history is not History.NONE):

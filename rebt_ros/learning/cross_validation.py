@@ -1,12 +1,11 @@
 """Cross-validation of pruning levels.
 
 recall
-    Of an action: the share of its rows on which a tree takes it, of the rows that it was not
-    learned from.
+    The recall of an action is the share of its rows on which a tree takes it, among rows that the
+    tree was not learned from.
 
-A level is judged by its mean recall over all actions, so that an action that is rare but decisive
-counts as much as a frequent one (see `judged_levels`).  Rows count by the weights of their
-demonstrations.
+A level is judged by its mean recall over all actions: an action that is rare but decisive counts as
+much as a frequent one (see `judged_levels`).  Rows count by the weights of their demonstrations.
 """
 
 from __future__ import annotations
@@ -25,29 +24,29 @@ from rebt_ros.learning.evaluation import decision_tree_choices
 from rebt_ros.learning.judged_levels import JudgedLevels
 
 MOST_FOLDS = 5
-#: Folds of large tables, each of which has rows enough.
+#: Number of folds of large tables, each of which has enough rows.
 _FEW_FOLDS, _MANY_ROWS = 3, 8_000
-#: A tree that may test LAT has to be converted and run through the rows to be judged: so many
-#: levels are, and no larger trees than that, which nobody could read anyway.
+#: A tree that may test LAT must be converted and run over the rows to be judged: the maximum number
+#: of levels for which this is done, and of leaves, beyond which nobody could read a tree anyway.
 _MOST_LEVELS_RUN, _MOST_LEAVES_RUN = 12, 32
 
-#: What the behavior tree of a pruned decision tree chooses in the rows of a table after its own
-#: choices in the rows before: positions in the table's actions.
+#: What the behavior tree of a pruned decision tree chooses in the rows of a table, after its own
+#: choices in earlier rows: positions in the table's actions.
 Choices = Callable[[TrainedTree, DemonstrationTable], IntArray]
 
 
 class CrossValidation:
-    """One fit to some rows and one to those outside each fold, all with their pruning levels.
+    """A fit to all rows, and one to the rows outside each fold, with all their pruning levels.
 
-    A level's ``ccp_alpha`` stands for the range up to the next one, at whose geometric middle the
-    folds' trees are pruned.
+    The ``ccp_alpha`` of a level stands for the range up to the next one; the trees of the folds are
+    pruned at the geometric mean of this range.
 
     Args:
         table: At least two rows.
-        options: How the trees are fitted; none is judged on rows that were made up.
-        step: Called after each tree that was fitted, and each fold in which trees were run.
+        options: How the trees are fitted; none is judged on made-up rows.
+        step: Called after each fit, and after each fold in which trees were run.
         held_out: Rows that are in no fold, and that no fold's tree is fitted to, shape (rows,).
-        grown_on: The rows that splits are chosen by, shape (rows,); None for all.
+        grown_on: The rows that choose the splits, shape (rows,); None for all.
     """
 
     def __init__(
@@ -66,7 +65,7 @@ class CrossValidation:
         fold[inside] = folds(table.where(inside))
         numbers = np.unique(fold[inside])
         trees: list[FittedTree] = []
-        # The largest first, so that no core waits for the last one.
+        # The largest first: no core then waits for the last one.
         parts = [
             *([] if held_out is None else [inside]),
             *(inside & (fold != number) for number in numbers),
@@ -79,7 +78,7 @@ class CrossValidation:
             trees.append(tree)
             step()
         self.of_all = trees[0]
-        """Fitted to all rows."""
+        """The tree fitted to all rows."""
         self.fitted, *of_folds = trees if held_out is None else trees[1:]
         self._folds = [
             (tree, table.where(fold == number))
@@ -88,15 +87,15 @@ class CrossValidation:
         self._middles = self.fitted.path.middles
 
     def teacher_forced(self) -> JudgedLevels:
-        """All levels after what the demonstrator did."""
+        """All levels, after the actions of the demonstrator."""
         hits = [fitted.hits(rows, self._middles) for fitted, rows in self._folds]
         return self._judged(self.fitted.path.alphas, hits)
 
     def levels(self, choices: Choices) -> JudgedLevels:
         """The levels to choose from: all, or an even selection if LAT is tested.
 
-        What the demonstrator did before is what a previous action is taken from.  LAT knows the
-        action of its own row, so that trees which test it are judged after their own choices.
+        Previous actions are those of the demonstrator.  LAT knows the action of its own row, so
+        trees that test LAT are judged after their own choices.
         """
         if self.fitted.vocabulary.history is not History.LAST:
             return self.teacher_forced()
@@ -107,7 +106,7 @@ class CrossValidation:
         return self._judged(self.fitted.path.alphas[run], hits)
 
     def unpruned(self) -> JudgedLevels:
-        """The folds' unpruned trees, after their own choices: one level."""
+        """A single level: the unpruned trees of the folds, after their own choices."""
         unpruned = np.zeros(1)
 
         def choices(trained: TrainedTree, table: DemonstrationTable) -> IntArray:
@@ -117,7 +116,7 @@ class CrossValidation:
         return self._judged(unpruned, hits)
 
     def own_history_at(self, ccp_alpha: float, choices: Choices) -> float:
-        """Mean own-history agreement of the folds' trees at one level."""
+        """Mean own-history agreement of the folds' trees at a level."""
         level = np.array([ccp_alpha])
         hits = [self._run(place, level, choices) for place in range(len(self._folds))]
         return float(self._judged(level, hits).means[0])
@@ -139,7 +138,7 @@ class CrossValidation:
         known: dict[bytes, IntArray] = {}
         found: list[IntArray] = []
         for ccp_alpha in ccp_alphas.tolist():
-            # The levels are those of another tree, several of which can be one level of this one.
+            # The levels are those of another tree; several of them may be one level of this tree.
             level = fitted.path.leaves_at(ccp_alpha).tobytes()
             if level not in known:
                 right = choices(fitted.at(ccp_alpha), rows) == rows.chosen
@@ -152,8 +151,7 @@ class CrossValidation:
 def folds(table: DemonstrationTable) -> IntArray:
     """The fold of each row: whole demonstrations, or stretches of the only one, shape (rows,).
 
-    Neighboring rows resemble each other, so that a row whose neighbors were learned from would
-    tell little.
+    Neighboring rows resemble each other, so a row whose neighbors were learned from says little.
     """
     most = MOST_FOLDS if len(table) < _MANY_ROWS else _FEW_FOLDS
     shown, position = np.unique(table.demonstration, return_inverse=True)

@@ -1,15 +1,15 @@
 """How well a behavior tree does on a table: fidelity and agreement.
 
 fidelity
-    It chooses what its decision tree predicts; where conditions are left out (see
+    It chooses what its decision tree predicts; if conditions are left out (see
     `needless_conditions`), in the rows that the decision tree gets right.
 agreement, teacher-forced
-    It chooses what the demonstrator did, after what the demonstrator did before.  The column of
+    It chooses what the demonstrator did, after the demonstrator's earlier actions.  The column of
     LAT knows the action of its own row, from which it differs, so the figure flatters trees that
     test LAT.
 agreement, own-history
-    It chooses what the demonstrator did, after what the tree chose itself in earlier rows: what
-    to expect of the executed tree.
+    It chooses what the demonstrator did, after its own choices in earlier rows: what to expect of
+    the executed tree.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ from rebt_ros.demonstration.last_action import NO_ACTION, ActionHistory, History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import LastActionIs, Literal, PreviousActionIs
 
-#: Of trees that are only to be ticked.
+#: Names of trees that are only ticked.
 _NOT_LEARNED = Provenance(
     0, 0, 0.0, None, 0.0, Root.SELECTOR, History.NONE, Figures(0, None, None, 0)
 )
 
-#: Rows that a decision tree is run over at a time, with whatever was done before them.
+#: How many rows a decision tree is run over at a time, for all possible previous actions.
 _ROWS_AT_A_TIME = 65_536
 
-#: Conditions that are told apart by one number each; with more, the kinds are counted anew.
+#: Maximum number of conditions that one number encodes; with more, kinds are renumbered.
 _MOST_BITS = 30
 
 
@@ -53,7 +53,7 @@ def actions_of(table: DemonstrationTable) -> tuple[nodes.Action, ...]:
 
 
 def teacher_forced_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
-    """What the tree chooses in each row after what is in the table, as for a decision tree.
+    """What the tree chooses in each row after the actions in the table, as a decision tree does.
 
     Returns:
         Positions in ``table.actions``, `NO_ACTION` where it chooses none, shape (rows,).
@@ -65,8 +65,8 @@ def teacher_forced_choices(tree: nodes.Node, table: DemonstrationTable) -> IntAr
 def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
     """What the tree chooses in each row after its own choices in the rows before it.
 
-    An action counts as done once it is chosen.  What the tree keeps in mind beside its choices (at
-    which step a Sequence is, that a Repeater runs) it keeps from row to row, as on the robot.
+    An action counts as done once it is chosen.  Other memory of the tree (the step of a Sequence, a
+    running Repeater) is kept from row to row, as on the robot.
 
     Returns:
         Positions in ``table.actions``, `NO_ACTION` where it chooses none, shape (rows,).
@@ -79,7 +79,7 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
         return teacher_forced_choices(tree, table)
     situations, of_row = _situations(tree, table)
     plan, actions = Plan(tree, table.features), actions_of(table)
-    # Each history that comes up is evaluated once: there are far fewer than rows.
+    # Each history is evaluated once: there are far fewer than rows.
     choices: dict[tuple[str | None, tuple[str, ...]], list[int]] = {}
 
     def after(previous: str | None, recent: tuple[str, ...]) -> list[int]:
@@ -97,7 +97,7 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
         for situation in of_row[start:end].tolist():
             choice = chooses[situation]
             chosen.append(choice)
-            # What was done just now is the first in the history already.
+            # The latest action is already the first in the history.
             if choice not in (newest, NO_ACTION):
                 newest = choice
                 label = table.actions[choice]
@@ -107,7 +107,7 @@ def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray
 
 
 def _ticked_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
-    """What the tree chooses when it is ticked in one row after the other."""
+    """What the tree chooses when it is ticked in one row after another."""
     actions = dict.fromkeys((*actions_of(table), *nodes.actions(tree)))
     learned = LearnedTree(
         table.features, tuple(actions), tree, _NOT_LEARNED, row_kind=table.row_kind
@@ -121,14 +121,14 @@ def _ticked_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
 
 
 def ticks(runtime: TreeRuntime, table: DemonstrationTable) -> Iterator[tuple[bool, Tick]]:
-    """Ticks a tree once in each row; its history begins with each demonstration's.
+    """Ticks a tree once in each row; its history starts again with each demonstration.
 
     Args:
         runtime: Runs the tree; its features are those of the table.
         table: The rows.
 
     Yields:
-        Of each row, whether a demonstration begins with it, and the tick.
+        For each row, whether a demonstration begins with it, and the tick.
     """
     own = runtime.histories.setdefault(table.channel, ActionHistory())
     for row, (starts, state) in enumerate(
@@ -151,12 +151,12 @@ def decision_tree_choices(
 ) -> IntArray:
     """What a decision tree chooses in each row after its own choices in the rows before it.
 
-    The behavior tree of a decision tree that does not test LAT chooses the same, and takes longer
-    to be made.
+    The behavior tree of a decision tree that does not test LAT chooses the same, but takes longer
+    to make.
 
     Args:
-        predict: What it chooses in each row after what is in the table.
-        history: What it may test of what was done before.
+        predict: What it chooses in each row after the actions in the table.
+        history: Which earlier action it may test.
         table: The rows.
     """
     match history:
@@ -164,7 +164,7 @@ def decision_tree_choices(
             return predict(table)
         case History.LAST:
             raise ValueError("LAT depends on the rule that asks, which a decision tree has none of")
-    # What is chosen after each action, and in the last line after none.
+    # The choices after each action; in the last line, after none.
     befores = [*range(len(table.actions)), NO_ACTION]
     chosen = np.empty(len(table), dtype=np.int64)
     starts = _starts(table)
@@ -186,23 +186,23 @@ def decision_tree_choices(
 
 
 def agreement(chosen: IntArray, table: DemonstrationTable) -> float | None:
-    """Share of the rows in which `chosen` is what the demonstrator did; None without rows."""
+    """Share of rows in which `chosen` is what the demonstrator did; None without rows."""
     return float(np.mean(chosen == table.chosen)) if len(table) else None
 
 
 def mean_recall(hits: IntArray, shown: IntArray) -> FloatArray:
-    """The mean over the actions that were shown of the share of their rows that was hit.
+    """The mean recall of the actions that were shown.
 
     Args:
-        hits: Rows, shape (..., actions).
-        shown: Of so many, shape (actions,).
+        hits: Rows of each action that were predicted, shape (..., actions).
+        shown: Rows of each action, shape (actions,).
     """
     occurring = shown > 0
     return np.asarray(np.mean(hits[..., occurring] / shown[occurring], axis=-1))
 
 
 def _situations(tree: nodes.Node, table: DemonstrationTable) -> tuple[DemonstrationTable, IntArray]:
-    """A row of each kind that the state alone tells apart, and the kind of each row."""
+    """A row of each kind that states distinguish, and the kind of each row."""
     states = States(table.features, table.states, lambda condition: False)
     tested = dict.fromkeys(
         one.literal.condition
@@ -223,7 +223,7 @@ def _situations(tree: nodes.Node, table: DemonstrationTable) -> tuple[Demonstrat
 
 
 def _recent_at(row: int, table: DemonstrationTable) -> tuple[str, ...]:
-    """What is known to have been done before the first row of a demonstration."""
+    """What is known of actions before the first row of a demonstration."""
     code = NO_ACTION if table.before is None else table.before[table.demonstration[row]]
     label = _label(table, code)
     return () if label is None else (label,)
@@ -234,7 +234,7 @@ def _label(table: DemonstrationTable, code: int) -> str | None:
 
 
 def _after(recent: tuple[str, ...], action: str, reach: int) -> tuple[str, ...]:
-    """The distinct actions taken, most recent first, as far back as the tree can tell."""
+    """The distinct actions taken, most recent first, as far back as the tree looks."""
     return (action, *(one for one in recent if one != action))[:reach]
 
 

@@ -1,4 +1,4 @@
-"""How decision trees are fitted, as the options of learning say."""
+"""Options of decision trees, from those of learning."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from rebt_ros.learning.options import LearnOptions
 
 
 def fit_options(options: LearnOptions, vocabulary: Vocabulary) -> FitOptions:
-    """How to fit a tree that may test what a vocabulary says."""
+    """How to fit a tree with a vocabulary."""
     return FitOptions(vocabulary, options.max_depth, options.random_state, options.upsample)

@@ -1,4 +1,4 @@
-"""Actions moved back to the states that they answer: how a known reaction time is undone."""
+"""Undoing a known reaction time: actions move back to the states that they respond to."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from rebt_ros.errors import OptionError
 
 
 def shifted(table: DemonstrationTable, rows: int) -> DemonstrationTable:
-    """The table with actions moved back to the states that they are answers to.
+    """The table with actions moved back to the states that they respond to.
 
-    Row t gets the action of row t + `rows` of its demonstration; the last rows, which then have no
-    action, are left out, and so are demonstrations that have no others.  What was done before each
-    row is derived from the moved actions; where something was done before a demonstration began,
-    LAT of its first row still knows about that.
+    Row t gets the action of row t + `rows` of its demonstration.  The last rows, which then have no
+    action, are left out, as are demonstrations without other rows.  What was done before each row
+    is derived from the moved actions.  If something was done before a demonstration began, LAT of
+    its first row still knows.
 
     Args:
         table: Rows of one channel, in whole demonstrations.
@@ -49,15 +49,15 @@ def shifted(table: DemonstrationTable, rows: int) -> DemonstrationTable:
 
 
 def tells_time(table: DemonstrationTable) -> bool:
-    """Whether the stamps are more than numbers of rows."""
+    """Whether the stamps are times, not row numbers."""
     return row_gap(table) is not None
 
 
 def rows_in(table: DemonstrationTable, seconds: float) -> int:
-    """How many rows a time is, to the nearest one.
+    """A time in rows, rounded.
 
     Raises:
-        OptionError: The table's stamps tell no time.
+        OptionError: The table's stamps are not times.
     """
     gap = row_gap(table)
     if not seconds:
@@ -71,14 +71,14 @@ def rows_in(table: DemonstrationTable, seconds: float) -> int:
 
 
 def places(table: DemonstrationTable) -> tuple[IntArray, IntArray]:
-    """Each row's place in its demonstration, and how many rows that has, both of shape (rows,)."""
+    """Position of each row in its demonstration, and number of rows there, both (rows,)."""
     first = np.searchsorted(table.demonstration, table.demonstration)
     end = np.searchsorted(table.demonstration, table.demonstration, side="right")
     return np.arange(len(table)) - first, end - first
 
 
 def row_gap(table: DemonstrationTable) -> float | None:
-    """Seconds from a row to the next; None where stamps tell no time."""
+    """Seconds from one row to the next; None if stamps are not times."""
     gaps = np.diff(table.stamps)[np.diff(table.demonstration) == 0]
     gap = float(np.median(gaps)) if len(gaps) else 0.0
     return gap / 1e9 if gap > NO_TIME else None

@@ -1,4 +1,4 @@
-"""A learned policy that can be looked into and changed without learning again."""
+"""A learned policy that can be inspected and changed without learning again."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from rebt_ros.verification.explaining import Explanation, explain
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Learning:
-    """The policy of one channel beside what it was made from.
+    """The policy of a channel, with what it was made from.
 
-    Each verb gives another `Learning` and leaves this one as it is.
+    Each method returns another `Learning` and leaves this one unchanged.
     """
 
     learned: LearnedTree
-    """What is published."""
+    """The published tree."""
     plain: LearnedTree
-    """The same before anything was attached or resolved, with all suggestions."""
+    """The tree before anything was attached or resolved, with all suggestions."""
     decision_tree: TrainedTree
     policy: ChosenPolicy
-    """What was chosen to learn, and why."""
+    """The choices made, and their reasons."""
     evidence: Evidence
     """What it was learned from."""
     report: LearningReport
-    """What a person must know about it."""
+    """What a person must know before it drives."""
     late: tuple[str, ...] = ()
     """A sentence if actions were late; no full stop."""
     further: tuple[str, ...] = ()
-    """Notes beside those of the report; no full stops."""
+    """Further notes, besides those of the report; no full stops."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -55,7 +55,7 @@ class Learning:
 
     @property
     def options(self) -> LearnOptions:
-        """How it was learned, with what is attached by now."""
+        """How it was learned, with the suggestions that are now attached."""
         return self.evidence.options
 
     @property
@@ -64,10 +64,10 @@ class Learning:
         return Levels(self.evidence, self.policy)
 
     def level(self, number: int) -> Learning:
-        """The policy at another pruning level, without suggestions, which belong to a tree.
+        """The policy at another pruning level, without suggestions, which belong to a single tree.
 
         Args:
-            number: The level; 0 is not pruned.
+            number: The level; 0 is unpruned.
 
         Raises:
             OptionError: There is no such level.
@@ -92,19 +92,19 @@ class Learning:
         """The policy with further suggestions attached.
 
         Args:
-            ids: Of the suggestions; `ALL` for all.
+            ids: Ids of the suggestions; `ALL` for all.
 
         Raises:
-            OptionError: There is no suggestion with such an id.
+            OptionError: There is no suggestion with this id.
         """
         attach = tuple(dict.fromkeys((*self.options.attach, *ids)))
         return self._accepting(attach, self.options.psa_choice)
 
     def without(self, *ids: str) -> Learning:
-        """The policy with suggestions taken off again.
+        """The policy with suggestions detached.
 
         Args:
-            ids: Of suggestions that are attached; `ALL` for all.
+            ids: Ids of attached suggestions; `ALL` for all.
 
         Raises:
             OptionError: One of them is not attached.
@@ -119,19 +119,19 @@ class Learning:
         return self._accepting(kept, self.options.psa_choice)
 
     def resolved(self, choice: PsaChoice | None) -> Learning:
-        """The policy with all PSA nodes turned into what is chosen; None leaves them."""
+        """The policy with all PSA nodes turned into the chosen node; None leaves them."""
         return self._accepting(self.options.attach, choice)
 
     def edited(self, edit: Callable[[nodes.Node], nodes.Node]) -> Learning:
         """The policy with a tree that a person changed (see `behavior_tree.paths`).
 
-        What is attached or resolved afterwards is based on the changed tree.
+        Later attachments and resolutions apply to the changed tree.
 
         Args:
-            edit: From the tree to the changed one.
+            edit: A function from the tree to the changed one.
 
         Raises:
-            ValueError: The changed tree tests or takes what is not declared.
+            ValueError: The changed tree has undeclared features or actions.
         """
         learned = replace(self.learned, tree=edit(self.learned.tree))
         offered = tuple(suggestion for suggestion in learned.suggestions if not suggestion.attached)
@@ -139,11 +139,11 @@ class Learning:
         return replace(self, plain=plain)._accepting((), None)
 
     def explain(self, row: int) -> Explanation:
-        """Why the tree does in a row what it does: the branch, and the rows that taught it.
+        """Why the tree does what it does in a row: the branch, and the rows that taught it.
 
         Args:
-            row: Its position in the table, after what was done before it there.  For states that
-                nobody showed, see `verification.explaining.explain`.
+            row: Position in the table, whose earlier actions count.  For states that nobody showed,
+                see `verification.explaining.explain`.
 
         Raises:
             OptionError: There is no such row.
@@ -179,10 +179,10 @@ def learned_as_asked(
     late: tuple[str, ...] = (),
     further: tuple[str, ...] = (),
 ) -> Learning:
-    """A policy with the suggestions attached that its options name, and PSA nodes as they say.
+    """A policy with suggestions attached and PSA nodes resolved as its options say.
 
     Raises:
-        OptionError: There is no suggestion with such an id.
+        OptionError: There is no suggestion with this id.
     """
     options = evidence.options
     tree, suggestions = accept(plain.tree, plain.suggestions, options)

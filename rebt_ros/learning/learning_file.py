@@ -1,4 +1,4 @@
-"""The file beside tree.json from which a `Learning` comes back without learning again."""
+"""learning.npz, the file beside tree.json that a `Learning` is loaded from."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ from rebt_ros.storage.array_file import read_arrays, write_arrays
 #: Its name.
 NAME = "learning.npz"
 
-#: Of the words and arrays below.
+#: Version of the contents below.
 VERSION = 2
 
-#: Values of a table that are kept at most: 100,000 rows of 20 features.
+#: Maximum number of values of a table that is kept: 100,000 rows of 20 features.
 MOST_VALUES = 2_000_000
 
 _TREE = ("left", "right", "column", "threshold", "counts", "risk")
@@ -47,7 +47,7 @@ _LEVELS = ("ccp_alphas", "hits", "shown", "leaves", "explanations")
 
 
 def write_learning(directory: Path, learning: Learning) -> tuple[str, ...]:
-    """Writes learning.npz, or takes an older one away where the table is too large for it.
+    """Writes learning.npz, or removes an older one if the table is too large.
 
     Returns:
         Notes; no full stops.
@@ -65,7 +65,7 @@ def write_learning(directory: Path, learning: Learning) -> tuple[str, ...]:
 
 
 def load_learning(path: str | Path) -> Learning:
-    """A learned policy as it was when it was written, without learning again.
+    """Loads a learned policy, without learning again.
 
     Args:
         path: learning.npz, or the directory that `learn` wrote it to.
@@ -105,7 +105,7 @@ class _Fit:
 
     history: History
     combinations: tuple[tuple[tuple[str, float], ...], ...]
-    """The terms of each; those of a difference have the weights 1 and -1."""
+    """The terms of each combination; a difference has the weights 1 and -1."""
     max_depth: int | None
     random_state: int
     notes: tuple[str, ...]
@@ -113,7 +113,7 @@ class _Fit:
 
 @dataclass(frozen=True, slots=True)
 class _Words:
-    """What the file says beside its arrays."""
+    """The contents of the file except arrays."""
 
     version: int
     plain: str
@@ -138,15 +138,15 @@ _WORDS: Final = record(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Saved:
-    """What a file of a learned policy holds."""
+    """The contents of a file of a learned policy."""
 
     words: dict[str, Any]
-    """What JSON can hold."""
+    """The contents that are JSON."""
     arrays: dict[str, npt.NDArray[Any]]
 
 
 def saved(learning: Learning) -> Saved | None:
-    """A policy as plain values; None where its table is too large to be kept (`MOST_VALUES`)."""
+    """A policy as plain values; None if its table is too large (`MOST_VALUES`)."""
     evidence, table = learning.evidence, learning.evidence.table
     if table.states.size > MOST_VALUES:
         return None
@@ -179,10 +179,10 @@ def saved(learning: Learning) -> Saved | None:
 
 
 def restored(kept: Saved) -> Learning:
-    """The policy that was saved.
+    """The saved policy.
 
     Raises:
-        InputError: It is of another version, or its parts do not fit each other.
+        InputError: Its version differs, or its parts do not fit together.
     """
     if kept.words.get("version") != VERSION:
         raise InputError(
@@ -193,7 +193,7 @@ def restored(kept: Saved) -> Learning:
     except MisfitError as err:
         raise InputError(f"{err.sentence('what it says').rstrip('.')}: learn again.") from err
     except (RebtError, KeyError, TypeError, ValueError, IndexError, AttributeError) as err:
-        raise InputError(f"its parts do not fit each other ({err}): learn again.") from err
+        raise InputError(f"its parts do not fit together ({err}): learn again.") from err
 
 
 def _restored(words: _Words, arrays: Mapping[str, npt.NDArray[Any]]) -> Learning:
@@ -289,7 +289,7 @@ def _of(
 ) -> npt.NDArray[Any]:
     array = arrays[name]
     if array.ndim != axes or array.dtype.kind != np.dtype(kind).kind:
-        raise ValueError(f"{name} is no array of its kind")
+        raise ValueError(f"{name} is not an array of the right kind")
     return array.astype(kind)
 
 
@@ -327,14 +327,14 @@ def _check_tree(grown: GrownTree, width: int, actions: int) -> None:
     if sizes != {len(grown)} or not len(grown) or grown.counts.shape[1] != actions:
         raise ValueError("the arrays of a decision tree differ in length")
     for child in (grown.left, grown.right):
-        # Children come after their parents, so that every walk ends.
+        # Children come after their parents, so every walk ends.
         if (
             not ((child > nodes) & (child < len(grown)))[splits].all()
             or (child[~splits] >= 0).any()
         ):
-            raise ValueError("a decision tree has nodes that are no tree")
+            raise ValueError("the nodes of a decision tree do not form a tree")
     if not _within(grown.column[splits], 0, max(width, 1)):
-        raise ValueError("a decision tree compares what there is not")
+        raise ValueError("a decision tree compares a column that does not exist")
 
 
 def _within(codes: IntArray | FloatArray, least: int, end: int) -> bool:

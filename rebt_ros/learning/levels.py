@@ -1,7 +1,7 @@
-"""What a policy was learned from, and the tree that it gives at each pruning level.
+"""What a policy was learned from, and its tree at each pruning level.
 
-A level's figures come from the same level of the tree that was fitted to the rows which were not
-held out, so that each is judged on rows that it was not learned from.
+The figures of a level come from the same level of the tree that was fitted without the held-out
+rows: each level is judged on rows that it was not learned from.
 """
 
 from __future__ import annotations
@@ -48,20 +48,20 @@ class LevelTree:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Evidence:
-    """The rows, and the trees that were fitted to them, with all their pruning levels."""
+    """The rows, and the trees fitted to them, with all their pruning levels."""
 
     table: DemonstrationTable
-    """All rows, lagged features included, late actions moved back."""
+    """All rows, with lagged features, and with late actions moved back."""
     held_out: BoolArray
     """Rows that the tree was judged on, shape (rows,)."""
     intended: IntArray
-    """What was meant in each row, shape (rows,): what was done, but for mistakes."""
+    """The action meant in each row, shape (rows,); differs from the shown one in mistakes."""
     fitted: FittedTree
-    """Fitted to the rows that the published tree is learned from."""
+    """Tree fitted to the rows that the published tree is learned from."""
     judge: FittedTree
-    """Fitted to the rows that were not held out: what figures come from."""
+    """Tree fitted to the rows that were not held out, for the figures."""
     psa: bool
-    """Whether PSA nodes stand in the trees."""
+    """Whether the trees have PSA nodes."""
     options: LearnOptions
 
     @property
@@ -74,12 +74,12 @@ class Evidence:
 
     @property
     def rows_learned_from(self) -> BoolArray:
-        """Which of all rows these are, shape (rows,)."""
+        """Which rows these are, shape (rows,)."""
         meant = np.asarray(self.intended == self.table.chosen)
         return meant if self.options.refit else meant & ~self.held_out
 
     def decision_tree_at(self, ccp_alpha: float) -> TrainedTree:
-        """The decision tree of a pruning level, with thresholds as the options say."""
+        """The decision tree of a pruning level, with thresholds by the options."""
         if self.options.readable_thresholds and self.options.upsample is Upsampling.NONE:
             return self.fitted.readable_at(ccp_alpha, self.learned_from)
         return self.fitted.at(ccp_alpha)
@@ -89,7 +89,7 @@ class Evidence:
 
         Args:
             ccp_alpha: The level.
-            judged_at: The level of the tree that figures come from; None for the same.
+            judged_at: The level of the tree that the figures come from; None for the same level.
         """
         table = self.learned_from
         trained = self.decision_tree_at(ccp_alpha)
@@ -110,7 +110,7 @@ class Evidence:
     def _figures(self, judge: TrainedTree) -> Figures:
         """How well the behavior tree of a decision tree does on rows that it was not learned from.
 
-        Of fidelity nothing is said: that is about the tree that is published (see `mismatches`).
+        The figures do not include fidelity, which is about the published tree (see `mismatches`).
         """
         rows, options, psa = self.table.where(self.held_out), self.options, self.psa
         if not len(rows):
@@ -146,7 +146,7 @@ class CrossValidated:
     """Mean over the actions."""
     agreement: float
     standard_error: float
-    """Of the agreement."""
+    """Standard error of the agreement."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -154,18 +154,18 @@ class PruningLevel:
     """A pruning level."""
 
     number: int
-    """Its place on the pruning path: 0 is the tree as it was fitted."""
+    """Its position on the pruning path; 0 is the tree as fitted."""
     ccp_alpha: float
     decision_tree: DecisionTree
     leaves: int
-    """Of the decision tree."""
+    """Leaves of the decision tree."""
     learned: LearnedTree
     cross_validated: CrossValidated | None
-    """None where there were too few rows, or where the level was not run."""
+    """None if there were too few rows, or if the level was not run."""
     chosen: bool
     best: bool
     reduced: bool
-    """Whether all reductions were made that were asked for, if any were."""
+    """Whether all requested reductions were made, if any were requested."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -187,22 +187,22 @@ class Levels:
 
     @property
     def chosen(self) -> int:
-        """The level that was chosen, or that the ``ccp_alpha`` asked for comes to."""
+        """The chosen level, or that of the requested ``ccp_alpha``."""
         return _level_of(self.ccp_alphas, self.policy.ccp_alpha)
 
     @property
     def best(self) -> int | None:
-        """The level with the highest agreement in cross-validation; None where there was none."""
+        """The level with the highest agreement in cross-validation; None without it."""
         judged = self.policy.levels
         if judged is None:
             return None
         return _level_of(self.ccp_alphas, float(judged.ccp_alphas[judged.best]))
 
     def selected(self, most: int) -> tuple[int, ...]:
-        """At most so many levels, evenly spread, with the first, last, best and chosen ones.
+        """A limited number of levels, evenly spread, with the first, last, best and chosen ones.
 
         Raises:
-            OptionError: Fewer than these four are asked for.
+            OptionError: The limit is below these four.
         """
         check_most_levels(most)
         last = len(self.ccp_alphas) - 1
@@ -214,7 +214,7 @@ class Levels:
         return tuple(sorted(spread))
 
     def level(self, number: int) -> PruningLevel:
-        """Makes the trees of a level."""
+        """Makes a level with its trees."""
         ccp_alpha = float(self.ccp_alphas[number])
         tree = self.evidence.tree_at(ccp_alpha)
         leaves = int(self.leaves[number])
@@ -240,7 +240,7 @@ class Levels:
             return None
         places = np.flatnonzero(judged.ccp_alphas == ccp_alpha)
         if not np.isin(judged.ccp_alphas, self.ccp_alphas).all():
-            # Another fit was judged: its level that a ``ccp_alpha`` comes to is the same.
+            # Another fit was judged: a ``ccp_alpha`` belongs to the same level there.
             places = np.array([judged.at(ccp_alpha)])
         for place in places:
             figures = (judged.mean_recalls, judged.means, judged.standard_errors)
@@ -256,7 +256,7 @@ def as_learned(
     figures: Figures,
     options: LearnOptions,
 ) -> LearnedTree:
-    """A behavior tree with where it came from."""
+    """A behavior tree with its provenance."""
     return LearnedTree(
         table.features,
         evaluation.actions_of(table),
@@ -277,13 +277,13 @@ def as_learned(
 
 
 def mismatches(table: DemonstrationTable, trained: TrainedTree, tree: nodes.Node) -> int:
-    """Rows on which a behavior tree chooses something else than its decision tree."""
+    """Rows on which a behavior tree and its decision tree choose different actions."""
     chosen = evaluation.teacher_forced_choices(tree, table)
     return int(np.sum(chosen != trained.predict(table)))
 
 
 def check_most_levels(most: int) -> None:
-    """Checks how many levels are asked for, before any work is done.
+    """Checks the requested number of levels, before any work is done.
 
     Raises:
         OptionError: There are too few.

@@ -1,15 +1,14 @@
-"""Mistakes of demonstrators: rows in which something was done that was not meant.
+"""Mistakes of demonstrators: rows with an action that was not meant.
 
-A mistake is an action that lasts for a row or two, and that the smallest explanation of the rows
-(see `FittedTree.explanation`) does not take where what it takes was done just before or after.
-Left out of what is learned from, with what follows it told the action that was right, it no longer
-teaches that a held action may end anywhere: that is what keeps a tree that tests the previous
-action from being learned from few demonstrations of people who err.
+A mistake is an action that lasts for a row or two and differs from the choice of the smallest
+explanation of the rows (see `FittedTree.explanation`), while this choice was taken just before or
+after.  Such rows are left out, and the row after one follows the action that was meant.  Otherwise
+they teach that a held action may end anywhere, and a tree that tests the previous action cannot be
+learned from few demonstrations with mistakes.
 
-Which rows these are depends on the explanation, and the other way round.  So an explanation of the
-rest is made, again and again, until it comes to mistakes that it came to before.  Of all rounds
-the one counts in which leaves, exceptions and mistakes are fewest together; none is a mistake where
-that is no less than without any.
+The mistakes depend on the explanation, and the explanation on the mistakes.  So the remaining rows
+are explained repeatedly, until mistakes recur.  The round with the fewest leaves, exceptions and
+mistakes in total counts.  If that is no fewer than without mistakes, there are none.
 """
 
 from __future__ import annotations
@@ -25,35 +24,35 @@ from rebt_ros.demonstration.demonstration import RowKind
 from rebt_ros.demonstration.last_action import NO_ACTION, History, previous_actions
 from rebt_ros.demonstration.table import DemonstrationTable
 
-#: Rows that a mistake lasts at most.
+#: Maximum number of rows of a mistake.
 _MOST_ROWS_HELD = 2
-#: Where an action would lose more than this share of its rows, they are what it is.
+#: If an action would lose more than this share of its rows, they are no mistakes.
 _MOST_LOST = 0.5
-#: With fewer rows for each leaf and exception, the size of an explanation tells nothing.
+#: With fewer rows per leaf and exception, the size of an explanation says nothing.
 _LEAST_ROWS_EACH = 5
-#: Rows of the largest table that is searched, and explanations that are made after the first.
+#: Maximum number of rows of a table, and of explanations after the first.
 _MOST_ROWS, _MOST_ROUNDS = 5_000, 5
 
 _WITH_PREVIOUS = FitOptions(vocabulary=Vocabulary(History.PREVIOUS))
 
 
 def intended_actions(table: DemonstrationTable) -> IntArray:
-    """What was meant in each row: what was done, but for mistakes.
+    """The action that was meant in each row, which differs from the shown one in mistakes.
 
     Args:
-        table: Rows of one channel, in whole demonstrations.  None is a mistake where rows are
-            events, which do not last, or where there are more than 5000.
+        table: Rows of one channel, in whole demonstrations.  If rows are events, which do not last,
+            or if there are more than 5000, none is a mistake.
 
     Returns:
         Positions in ``table.actions``, shape (rows,); deterministic.
     """
     chosen = table.chosen
-    # What looks like a mistake is told from what was done, however much that counts.
+    # Mistakes are found in what was done, whatever its weight.
     table = replace(table, weights=None)
     if table.row_kind is RowKind.EVENT or len(table) > _MOST_ROWS:
         return chosen
     held, before, after = _held(table)
-    # What is done last has nothing after it that would tell.
+    # Nothing follows the last action that could confirm a mistake.
     brief = (held <= _MOST_ROWS_HELD) & (after != NO_ACTION)
     intended, least = chosen, 0
     made = [chosen]
@@ -75,9 +74,9 @@ def intended_actions(table: DemonstrationTable) -> IntArray:
 
 
 def without_mistakes(table: DemonstrationTable, intended: IntArray) -> DemonstrationTable:
-    """The table without the rows in which something else was done than was meant.
+    """The table without mistakes.
 
-    What follows such a row follows the action that was meant.
+    The row after a mistake follows the action that was meant.
 
     Args:
         table: All rows.
@@ -88,7 +87,7 @@ def without_mistakes(table: DemonstrationTable, intended: IntArray) -> Demonstra
 
 
 def _following(table: DemonstrationTable, intended: IntArray) -> DemonstrationTable:
-    """The table in which each row follows what was meant in the one before it."""
+    """The table in which each row follows the action that was meant in the row before."""
     return replace(table, previous=previous_actions(intended, table.demonstration))
 
 
@@ -99,10 +98,11 @@ def _without_lost_actions(mistaken: BoolArray, table: DemonstrationTable) -> Boo
 
 
 def _held(table: DemonstrationTable) -> tuple[IntArray, IntArray, IntArray]:
-    """For how many rows each row's action is held, and the actions before and after that.
+    """For how many rows the action of each row is held, and the actions before and after that.
 
     Returns:
-        Three of shape (rows,); the latter `NO_ACTION` at the ends of demonstrations.
+        Three arrays of shape (rows,); the latter two have `NO_ACTION` at the ends of
+        demonstrations.
     """
     chosen, demonstration = table.chosen, table.demonstration
     starts = np.ones(len(table), dtype=bool)

@@ -1,4 +1,4 @@
-"""How to learn: everything that the paper's section III leaves to the user, and more."""
+"""How to learn: everything that section III of the paper leaves to the user, and more."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from rebt_ros.errors import OptionError
 #: Stands for the ids of all suggestions.
 ALL = "all"
 
-#: No one reacts later than that (seconds).
+#: Maximum reaction time (seconds).
 _LATEST = 5.0
 
 
 class Use(Enum):
-    """Whether the executed tree has something."""
+    """Whether the executed tree has a kind of node or test."""
 
     AUTO = "auto"
-    """Only where the demonstrations speak for it (see `choice`)."""
+    """Only if the demonstrations are better explained with it (see `choice`)."""
     ALWAYS = "always"
     NEVER = "never"
 
@@ -45,75 +45,74 @@ class PsaChoice(Enum):
 class LearnOptions:
     """What section III of the paper leaves to the user, and how to judge the result.
 
-    Enums are also taken by their words, such as ``psa="always"``.
+    Enums may be given by value, such as ``psa="always"``.
 
     Raises:
-        OptionError: A value of the wrong type, or out of its range.
+        OptionError: A value has the wrong type or is out of range.
     """
 
     delta: float = 0.3
-    """Threshold δ in [0, 1] of actions that are close enough to stand in one PSA node."""
+    """Threshold δ in [0, 1] of actions that are close enough for one PSA node."""
     psa: Use = Use.AUTO
-    """Whether PSA nodes stand in the executed tree."""
+    """Whether the executed tree has PSA nodes."""
     history: History | None = None
-    """What the executed tree may test of what was done before; None to choose between the previous
-    action and nothing by how simple the rows are to explain and, if that leaves it open, by
+    """Which earlier action the executed tree may test; None to choose between the previous action
+    and nothing, by how simple the rows are to explain and, if this leaves it open, by
     cross-validation (paper: LAT)."""
     differences: Use = Use.AUTO
     """Whether the executed tree may test the difference of two features."""
     sums: Use = Use.AUTO
     """Whether the executed tree may test weighted sums of features."""
     units: Mapping[str, str] = field(default_factory=dict)
-    """Units of features by their names: of different ones there is no difference."""
+    """Units of features by name; features with different units make no difference."""
     max_depth: int | None = None
-    """Splits on the decision tree's longest path; None to grow it fully, which leaves its size to
+    """Splits on the longest path of the decision tree; None to grow it fully and leave its size to
     pruning (paper: 5)."""
     ccp_alpha: float | None = None
-    """Complexity parameter of minimal cost-complexity pruning, 0 prunes nothing; None to choose
-    it by cross-validation."""
+    """Complexity parameter of minimal cost-complexity pruning; 0 prunes nothing, None chooses it by
+    cross-validation."""
     level: int | None = None
-    """Number of the pruning level, 0 prunes nothing, instead of a complexity parameter."""
+    """Number of the pruning level, instead of a complexity parameter; 0 prunes nothing."""
     root: Root = Root.SELECTOR
     reductions: Reductions | None = ALL_REDUCTIONS
-    """Reductions past the paper; None for those of Algorithm 1 alone, and for the paper's mode of
-    everything else: see `is_paper`."""
+    """Reductions beyond the paper; None for those of Algorithm 1 only, and for the paper's mode of
+    everything else (see `is_paper`)."""
     test_fraction: float = 0.25
-    """Share of the rows, or of the demonstrations if several, that is held out; in [0, 1)."""
+    """Share of the rows, or of several demonstrations, that is held out; in [0, 1)."""
     refit: bool = True
-    """Whether the tree is learned from all rows in the end, once it has been judged."""
+    """Whether the tree is finally learned from all rows, once it has been judged."""
     simplest: bool = True
-    """Whether, of the trees that fit the rows, the simplest one is searched for, instead of the
-    one that is grown greedily: of up to 5000 rows, and in trees of up to 30 leaves with at least
-    10 rows for each."""
+    """Whether to search for the simplest tree that fits the rows, instead of growing one greedily:
+    with up to 5000 rows, and in trees of up to 30 leaves with at least 5 rows for each."""
     readable_thresholds: bool = True
-    """Whether thresholds are moved to round values that splits share, within the gaps between the
-    rows that were shown."""
+    """Whether thresholds are moved to round values that splits share, within the gaps between shown
+    rows."""
     leave_out_mistakes: bool = True
-    """Whether rows that look like mistakes are left out of what is learned from, and out of what
-    was done before other rows: of at most 5000 samples."""
+    """Whether rows that look like mistakes are left out, with up to 5000 samples; the row after one
+    then follows the action that was meant."""
     leave_out_conditions: bool = True
-    """Whether conditions that no shown row needs are left out of rules in order of priority, unless
+    """Whether conditions that no shown row needs are left out of rules in priority order, unless
     the tree tests LAT (see `needless_conditions`)."""
     reaction_time: float | None = None
-    """How late the demonstrator acted (seconds), to be undone before learning; None to read it off
-    the demonstrations if their rows are samples, and otherwise 0."""
+    """How late the demonstrator acted (seconds), which is undone before learning; None to estimate
+    it from the demonstrations if rows are samples, and otherwise 0."""
     random_state: int = 0
-    """Decides between equally good splits, and which rows are made up."""
+    """Breaks ties between equally good splits, and decides which rows are made up."""
     lags: int = 0
     """How many rows each state feature looks back, 0 to 20; rows should be evenly spaced."""
     upsample: Upsampling = Upsampling.NONE
-    """Rows that decision trees are fitted to beside those shown; none is ever judged on them."""
+    """Additional rows that decision trees are fitted to, but never judged on."""
     attach: tuple[str, ...] = ()
     """Ids of the suggestions to attach, or `ALL`."""
     exact: bool = False
-    """Whether the structure of trees is grown on all rows, also where there are more than 100,000:
+    """Whether the structure of trees is grown on all rows even if there are more than 100,000;
     otherwise on a sample of whole demonstrations (see `structure`)."""
     routines: bool = True
-    """Whether Sequences and Repeaters are looked for in rows that share one state."""
+    """Whether to search for Sequences and Repeaters in rows that share a state."""
     psa_choice: PsaChoice | None = None
     """What to turn all PSA nodes into; None to leave them to the user."""
     last_action: InitVar[object] = None
-    """The paper's word for what `history` says, for a refusal that tells so."""
+    """The paper's term for `history`; refused with a sentence that says so."""
 
     def __post_init__(self, last_action: object) -> None:
         if last_action is not None:
@@ -149,7 +148,7 @@ class LearnOptions:
             raise OptionError(f"lags must lie between 0 and {LARGEST_LAG}, not at {self.lags}.")
 
     def _take_words(self) -> None:
-        """Takes the words of enums, as they stand on the command line, for their members."""
+        """Converts values of enums, as on the command line, to members."""
         for name, kind in _ENUMS.items():
             value = getattr(self, name)
             words = [str(member.value) for member in kind]
@@ -162,7 +161,7 @@ class LearnOptions:
                 raise OptionError(f"{name} must be one of {known}, not {value!r}.")
 
     def _take_numbers(self) -> None:
-        """Takes numbers of any library for Python's."""
+        """Converts numbers of any library to Python's."""
         kinds: tuple[tuple[tuple[str, ...], type, Callable[[Any], float], str], ...] = (
             (_NUMBERS, Real, float, "a number"),
             (_WHOLE_NUMBERS, Integral, int, "a whole number"),
@@ -196,10 +195,11 @@ class LearnOptions:
 
     @property
     def is_paper(self) -> bool:
-        """Whether no reduction past the paper is made, and suggestions are those of Algorithm 2.
+        """Whether there are no reductions beyond the paper, and suggestions are Algorithm 2's.
 
-        They are then more than twelve, from trees of any size and with 24 Repeaters of single loops
-        at most, and are attached behind the rules.  `paper` sets all other options as well.
+        There may then be more than twelve suggestions, from trees of any size, with at most 24
+        Repeaters of single loops; they are attached after the rules.  `paper` also sets all other
+        options.
         """
         return self.reductions is None
 
@@ -227,7 +227,7 @@ class LearnOptions:
         )
 
 
-#: Options that are one of several words.
+#: Options with enum values.
 _ENUMS: Mapping[str, type[Enum]] = {
     "psa": Use,
     "history": History,
@@ -237,7 +237,7 @@ _ENUMS: Mapping[str, type[Enum]] = {
     "upsample": Upsampling,
     "psa_choice": PsaChoice,
 }
-#: Options that are numbers, and those that say yes or no.
+#: Options that are numbers, and Boolean options.
 _NUMBERS = ("delta", "ccp_alpha", "test_fraction", "reaction_time")
 _WHOLE_NUMBERS = ("max_depth", "level", "random_state", "lags")
 _SWITCHES = (
@@ -251,7 +251,7 @@ _SWITCHES = (
 )
 #: Numbers that may be None.
 _LEFT_OPEN = frozenset({"ccp_alpha", "reaction_time", "max_depth", "level"})
-#: Those that are None where nobody chose.
+#: Options that are None if the user did not choose.
 _CHOSEN = frozenset({"history", "psa_choice"})
 
 

@@ -37,22 +37,22 @@ from rebt_ros.learning.reaction_time import ReactionTime, estimate, given
 from rebt_ros.learning.suggesting import suggest
 
 _UNEVEN = (
-    "the rows of channel {!r} are not evenly spaced, so that a row back is now more, now less time "
+    "the rows of channel {!r} are not evenly spaced, so one row back is no fixed time "
     "back: record with a sample rate to use lags"
 )
 _LARGE = (
-    "the decision tree of channel {!r} has {} leaves, too many for the best order of the rules to "
-    "be searched for: they stand by their number of leaves; prune more for a smaller tree"
+    "the decision tree of channel {!r} has {} leaves, too many to search for the best order of "
+    "the rules: they are ordered by their number of leaves; prune more for a smaller tree"
 )
 _VERY_LARGE = (
-    "the decision tree of channel {!r} has {} leaves, too many for its rules to be minimized and "
-    "put in their best order: they keep its conditions; prune more for a smaller tree"
+    "the decision tree of channel {!r} has {} leaves, too many to minimize its rules and "
+    "search for their best order: they keep its conditions; prune more for a smaller tree"
 )
 
-#: Up to so many rows, what is learned from all of them is chosen from all of them as well.
+#: Up to this many rows, a tree that is learned from all rows is also chosen from all rows.
 _CHOSEN_FROM_ALL = 5_000
 
-#: Where of all the work choosing and judging begin.
+#: Shares of the work at which choosing and judging begin.
 _CHOOSING, _JUDGING = 0.1, 0.8
 
 
@@ -66,10 +66,10 @@ def learn(
     Args:
         demonstrations: What was shown, oldest first.
         options: How to learn.
-        declared: Kinds of features by name, where they should not be detected.
+        declared: Kinds of features by name, for those that should not be detected.
 
     Raises:
-        InputError: Too few rows or actions, or features that differ.
+        InputError: There are too few rows or actions, or features differ.
         OptionError: A declared kind does not fit its feature.
     """
     return side_by_side(learn_channels(tabulate(demonstrations, declared), options))
@@ -98,7 +98,7 @@ def learn_channels(
 
 
 def _of_channel(channel: str, options: LearnOptions, channels: int) -> LearnOptions:
-    """The options with the ids of this channel's suggestions, which are led by its name."""
+    """The options with the ids of this channel's suggestions, without its name in front."""
     if channels == 1:
         return options
     led = f"{channel}/"
@@ -107,7 +107,7 @@ def _of_channel(channel: str, options: LearnOptions, channels: int) -> LearnOpti
 
 
 def side_by_side(learnings: Sequence[Learning]) -> LearnedTree:
-    """One tree of the policies of several channels, which act at the same time."""
+    """One tree from the policies of several channels, which act at the same time."""
     trees = [learning.learned for learning in learnings]
     first = trees[0]
     if len(trees) == 1:
@@ -182,14 +182,14 @@ def learn_from(
     """Learns the policy of one channel; see `learn`.
 
     Args:
-        table: Its rows, without lagged features: those that the options ask for are added.
+        table: Its rows, without lagged features; those that the options ask for are added.
         options: How to learn.
-        progress: Told what is being done and which share of the work is behind.
+        progress: Called with what is being done, and the share of the work that is done.
     """
     if table.weights is not None and options.upsample is not Upsampling.NONE:
         raise OptionError(
-            "rows are made up for rare actions, which have no weights, where the demonstrations "
-            "have some: leave out the upsampling or the weights."
+            "upsampling makes up rows, which have no weights, but the demonstrations have some: "
+            "leave out the upsampling or the weights."
         )
     names = [feature.name for feature in table.features]
     if unknown := sorted(set(options.units) - set(names)):
@@ -207,7 +207,7 @@ def learn_from(
             f"the {rows} of channel {table.channel!r} {show} one action only ({shown!r}): "
             "demonstrate at least two, as there is nothing to decide between."
         )
-    # Before any rows are set apart, so that each still knows those before it.
+    # Before any rows are held out: each row must still see those before it.
     table = with_lags(table, options.lags)
     held_out = table.held_out(options.test_fraction)
     intended = _intended(table, held_out, options)
@@ -244,14 +244,14 @@ def learn_from(
 def _intended(
     table: DemonstrationTable, held_out: BoolArray, options: LearnOptions
 ) -> tuple[IntArray, IntArray]:
-    """What was meant in each row, as far as rows that are not held out tell, and as all do.
+    """The action meant in each row, by the rows that are not held out, and by all rows.
 
-    Without `refit` nobody asks for the latter: both are the former.
+    Without `refit`, nothing needs the latter: both are the former.
     """
     if not options.leave_out_mistakes:
         return table.chosen, table.chosen
     known = table.chosen.copy()
-    # Of few rows each one counts, so that all of them take part or none.
+    # With few rows, each one counts: all of them take part, or none.
     if len(table) <= _CHOSEN_FROM_ALL:
         known[~held_out] = intended_actions(table.where(~held_out))
     return known, (intended_actions(table) if options.refit else known)
@@ -264,9 +264,9 @@ def _chosen(
     options: LearnOptions,
     progress: Progress,
 ) -> tuple[ChosenPolicy, ChosenPolicy]:
-    """The policy to judge, which knows nothing of the rows held out, and the one to publish."""
+    """The policy to judge, which does not know the held-out rows, and the one to publish."""
     progress("choosing", _CHOOSING)
-    # Of few rows each one counts, also for what is chosen: it is chosen once more from all.  So it
+    # With few rows, each one counts for choosing too: the choice is repeated with all rows.  So it
     # is where a level is asked for, which is one of the tree that is published.
     again = options.refit and (len(table) <= _CHOSEN_FROM_ALL or options.level is not None)
 
@@ -289,16 +289,16 @@ def _chosen(
 
 
 def reaction_time_of(table: DemonstrationTable, options: LearnOptions) -> ReactionTime:
-    """How late the demonstrator acted, as the options say or as the rows show.
+    """How late the demonstrator acted, by the options or by the rows.
 
     Raises:
-        OptionError: It is given in seconds, but stamps tell no time.
+        OptionError: It is given in seconds, but stamps are not times.
     """
     if options.reaction_time is not None:
         return given(table, options.reaction_time)
     if table.row_kind is RowKind.EVENT:
         return given(table, 0.0)
-    # How late people are is told from what they did, however much that counts.
+    # Reaction time is estimated from what was done, whatever its weight.
     return estimate(replace(table, weights=None))
 
 
@@ -308,11 +308,11 @@ def _late(provenance: Provenance, late: ReactionTime) -> Provenance:
 
 
 def _of_all(policy: ChosenPolicy, options: LearnOptions) -> ChosenPolicy:
-    """A policy of all rows, as chosen from those that were not held out."""
+    """A policy of all rows, as chosen by those that were not held out."""
     assert policy.of_all is not None
     ccp_alpha = policy.ccp_alpha
     if options.ccp_alpha is None:
-        # The levels of another fit lie elsewhere: what was chosen is the range up to the next one.
+        # The levels of another fit are elsewhere: the choice stands for the range up to the next.
         ccp_alpha = policy.fitted.path.middle(ccp_alpha)
     return replace(policy, fitted=policy.of_all, ccp_alpha=ccp_alpha)
 
@@ -351,7 +351,7 @@ def summary_sentence(learned: LearnedTree) -> str:
     shown = provenance.demonstrations
     judged = "it is not judged, as no rows were held out"
     if figures.own_history_agreement is not None:
-        # Rows that it was judged on may have been learned from afterwards.
+        # The rows that it was judged on may have been learned from afterwards.
         judged = (
             f"learned without them, it agrees with {figures.own_history_agreement:.1%} of "
             f"{figures.held_out_rows} held-out rows"

@@ -1,7 +1,7 @@
-"""A learned tree as an object that acts: from a state to what to do, in any program.
+"""A learned tree as an object that acts, in any program: from a state to an action.
 
-Every episode has a history of its own, exactly as the executor has it: what was done at the step
-before, LAT, and the states that lagged features look back at.
+Every episode has a history of its own, exactly as in the executor: the previous action, LAT, and
+the states that lagged features look back at.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from rebt_ros.learning.named_states import Encoding, State
 from rebt_ros.logic.conditions import HistoryCondition
 from rebt_ros.storage.tree_file import read_tree
 
-#: A label; None where the tree does nothing.  With several channels, one for each.
+#: A label, or None if the tree does nothing; with several channels, one for each.
 Decision: TypeAlias = str | dict[str, str | None] | None
 
 
 class Policy:
-    """What a learned tree does, step by step, in one episode or in several side by side.
+    """The actions of a learned tree, step by step, in one or several concurrent episodes.
 
     An action counts as done once it is chosen.
 
@@ -60,7 +60,7 @@ class Policy:
 
     @property
     def features(self) -> tuple[str, ...]:
-        """The names of the features that a state has, in their order."""
+        """The names of the features of a state, in order."""
         return self._encoding.names
 
     @property
@@ -72,7 +72,7 @@ class Policy:
         """Begins episodes, without any history.
 
         Args:
-            episodes: How many there are from now on; or which ones of those there are begin anew.
+            episodes: The number of episodes from now on; or which of the existing ones to restart.
         """
         if isinstance(episodes, int):
             self._episodes = [_Episode(self.learned, self._ticked) for _ in range(episodes)]
@@ -84,10 +84,10 @@ class Policy:
         """What to do now in the first episode.
 
         Args:
-            state: What is measured now; features that are not named are missing.
+            state: The current state; features that are not named are missing.
 
         Raises:
-            InputError: It does not fit the features.
+            InputError: The state does not fit the features.
         """
         return self.act_many([state], [0])[0]
 
@@ -97,14 +97,14 @@ class Policy:
         """What to do now in several episodes.
 
         Args:
-            states: What is measured now, one for each.
-            episodes: Numbers of the episodes, from 0, each once; by default all.
+            states: The current state of each.
+            episodes: Numbers of the episodes, from 0, each once; all by default.
 
         Returns:
             A decision for each.
 
         Raises:
-            InputError: There is not one state for each, or one does not fit the features.
+            InputError: The number of states is wrong, or one does not fit the features.
         """
         numbers = range(len(self._episodes)) if episodes is None else episodes
         if len(numbers) != len(states):
@@ -131,7 +131,7 @@ class Policy:
     def _chosen(
         self, acting: Sequence[_Episode], values: FloatArray
     ) -> list[dict[str, str | None]]:
-        """What memoryless trees do, for all episodes at once."""
+        """The actions of memoryless trees, for all episodes at once."""
         chosen: list[dict[str, str | None]] = [{} for _ in acting]
         for channel, plan in self._plans.items():
             histories = [one.histories[channel] for one in acting]
@@ -165,7 +165,7 @@ class _Episode:
         self._runtime = TreeRuntime(learned, tree=tree) if ticked else None
 
     def tick(self, state: Sequence[float]) -> dict[str, str | None]:
-        """What the ticked tree does: the command of each channel, as the executor sends it."""
+        """The command of each channel after a tick, as the executor sends it."""
         assert self._runtime is not None
         commands = {
             command.channel: command.label for command in self._runtime.tick(state).commands

@@ -4,5 +4,5 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-#: Told what is being done and which share of the work is behind.
+#: Called with what is being done, and the share of the work that is done.
 Progress = Callable[[str, float], None]

@@ -1,4 +1,4 @@
-"""A learned tree as a py_trees tree of one's own behaviours, to be a part of any program."""
+"""A learned tree as a py_trees tree of your own behaviours, for use in any program."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rebt_ros.errors import OptionError
 from rebt_ros.export import py_trees_xml
 from rebt_ros.learning.named_states import Encoding, State
 
-#: A behaviour of one's own, or what makes one.
+#: A behaviour, or a function that makes one.
 Carrying = py_trees.behaviour.Behaviour | Callable[[], py_trees.behaviour.Behaviour]
 
 
@@ -26,19 +26,19 @@ def to_py_trees(
     behaviours: Mapping[str, Carrying],
     state: Callable[[], State],
 ) -> py_trees.trees.BehaviourTree:
-    """A learned tree as a py_trees tree, whose actions are behaviours of yours.
+    """A learned tree as a py_trees tree, whose actions are your own behaviours.
 
-    Tick it, or add its root to a tree of your own.  It remembers what was done before, where the
-    tree tests that, and what lagged features were some ticks before.
+    Tick it, or add its root to a tree of your own.  It remembers earlier actions and the earlier
+    values of lagged features, if the tree tests them.
 
     Args:
         learned: The tree.
-        behaviours: By label, the behaviour that carries out the action, or what makes one: a
-            function is called once for each place that the action has in the tree.
-        state: What is measured now; called once per tick.
+        behaviours: For each label, the behaviour that carries out the action, or a function that
+            makes one, which is called once for each place of the action in the tree.
+        state: Returns the current state; called once per tick.
 
     Raises:
-        OptionError: An action of the tree has no behaviour, or one that cannot stand there.
+        OptionError: An action of the tree has no behaviour, or one that cannot be used there.
     """
     runtime = _runtime(learned, behaviours)
     return py_trees.trees.BehaviourTree(_Learned("learned", runtime.root, _Ticks(runtime, state)))
@@ -49,14 +49,14 @@ def py_trees_nodes(
     behaviours: Mapping[str, Carrying],
     state: Callable[[], State],
 ) -> dict[str, Any]:
-    """What the nodes of `to_py_trees_xml` do: a ``node_registry`` of py_trees' XML parser.
+    """The nodes of `to_py_trees_xml`, as a ``node_registry`` of py_trees' XML parser.
 
-    It is for one tree: each condition and action can be in one place.
+    A registry is for one tree: each condition and action has one place.
 
     Args:
         learned: The tree whose XML is parsed.
         behaviours: As in `to_py_trees`.
-        state: What is measured now; called once per tick.
+        state: Returns the current state; called once per tick.
 
     Raises:
         OptionError: This py_trees has no parser, or as in `to_py_trees`.
@@ -66,13 +66,13 @@ def py_trees_nodes(
     except ImportError as err:
         raise OptionError(
             f"py_trees {py_trees.version.__version__} reads no XML: install py_trees 2.5 or newer, "
-            "or take to_py_trees."
+            "or use to_py_trees."
         ) from err
     runtime = _runtime(learned, behaviours)
     ticks, free = _Ticks(runtime, state), set(range(len(runtime.snapshot())))
 
     class Whole(_NoPorts, PortsMixin, _Learned, register=False):
-        """The learned tree, below what it needs."""
+        """The learned tree, below the nodes that it needs."""
 
         def __init__(self, name: str, child: py_trees.behaviour.Behaviour, **own: Any) -> None:
             super().__init__(name, child, ticks, **own)
@@ -141,7 +141,7 @@ def _own(label: str, given: Carrying) -> py_trees.behaviour.Behaviour:
 
 
 class _NoPorts:
-    """What py_trees' parser asks its nodes for, in 2.5 by the functions and since by the names."""
+    """The attributes that py_trees' parser needs: functions in 2.5, names in newer versions."""
 
     INPUT_PORTS: ClassVar[dict[str, Any]] = {}
     OUTPUT_PORTS: ClassVar[dict[str, Any]] = {}
@@ -156,7 +156,7 @@ class _NoPorts:
 
 
 class _Ticks:
-    """Reads the state before a learned tree is ticked, and notes afterwards what it did."""
+    """Reads the state before a tick of a learned tree, and records afterwards what it did."""
 
     def __init__(self, runtime: TreeRuntime, state: Callable[[], State]) -> None:
         features = runtime.learned.features
@@ -175,7 +175,7 @@ class _Ticks:
 
 
 class _Learned(py_trees.decorators.Decorator):
-    """A learned tree below what reads and notes for it."""
+    """A learned tree below the nodes that read and record for it."""
 
     def __init__(
         self, name: str, child: py_trees.behaviour.Behaviour, ticks: _Ticks, **own: Any
@@ -197,7 +197,7 @@ class _Learned(py_trees.decorators.Decorator):
 
 
 class _Stand(py_trees.behaviour.Behaviour):
-    """Stands where a leaf of the runtime is to act, and does what that one does."""
+    """A placeholder for a leaf of the runtime, which does what that leaf does."""
 
     def __init__(self, name: str, acting: py_trees.behaviour.Behaviour, **own: Any) -> None:
         super().__init__(name=name, **own)

@@ -1,27 +1,26 @@
-"""Reaction time: how late a demonstrator acted, read off the demonstrations, and undone.
+"""Reaction time: how late a demonstrator acted, estimated from the demonstrations.
 
 delay
-    Rows that pass until a decision is acted on: row t's action belongs to the state d rows before.
+    Rows between a decision and its action: the action of row t belongs to the state d rows earlier.
 explanation
-    A decision tree of actions, with the rows that it gets wrong as exceptions (see
+    A decision tree of the actions, and the rows that it gets wrong as exceptions (see
     `FittedTree.explanation`).
 
 People act 0.1 to 0.5 s late.  At the true delay, actions follow from states by the demonstrator's
-own rules; at any other one, a tree must make up for what happened in between.  So its explanation
-is the smallest there.  All delays explain the same rows, with the same actions before them: only
-the states that they belong to differ.
+own rules.  At any other delay, a tree must account for what happened in between, so the explanation
+is smallest at the true one.  All delays explain the same rows, with the same actions before them;
+only the states differ.
 
-A tree that may test the previous action leans on it, as actions are held, and then hardly sees a
-delay; one that may not cannot explain a task that needs memory.  So both are asked (see
+A tree that may test the previous action relies on it, since actions are held, and so hardly notices
+a delay.  A tree that may not cannot explain a task that needs memory.  So both are used (see
 `estimate`).
 
-Few demonstrations have few changes of action, so that explanations differ by one or two leaves and
-exceptions.  Then it tells more how many bits they take (see `shortest_description`): who goes when
-a bell has rung is described by one test of the bell, and who goes two rows later by a position for
-each demonstration.
+In few demonstrations the action changes rarely, and explanations differ by one or two leaves and
+exceptions.  Their length in bits then says more (see `shortest_description`): going when a bell has
+rung takes one test of the bell, and going two rows later a position for each demonstration.
 
-Where several delays explain the rows equally well, borders tell them apart: who turns at 10 does so
-at the true delay only, and a row later at 9.37 (see `border_bits`).
+If several delays explain the rows equally well, borders distinguish them: a demonstrator who turns
+at 10 does so only at the true delay, and at 9.37 one row later (see `border_bits`).
 """
 
 from __future__ import annotations
@@ -47,39 +46,38 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning.late_actions import places, row_gap, rows_in
 
-#: Reactions take up to 0.5 s; a peak is seen only where there is a later delay to compare with.
+#: Reactions take up to 0.5 s; a minimum shows only if there is a later delay to compare with.
 _LATEST = 0.6
-#: Delays up to that many rows are tried where stamps tell no time.
+#: Longest delay in rows if stamps are not times.
 _MOST_ROWS = 6
-#: Delays lose the first rows of each demonstration: at most this share of the usual one.
+#: A delay drops the first rows of each demonstration: at most this share of the median length.
 _LOST = 1 / 3
-#: Delays that are tried at first; between them, only those around the best are.
+#: Delays that are tried first; in between, only those around the best.
 _FIRST_TRIALS = 8
-#: Rows that are explained, in so many stretches: as many fits as there are trials then cost about
-#: as much as one or two to 20,000 rows.
+#: Number of rows that are explained, and of stretches: all trials then cost about as much as one or
+#: two fits to 20,000 rows.
 _ROWS, _STRETCHES = 2_000, 10
-#: States alone explain late actions only if that takes at most so many times what states with
-#: previous actions take to explain actions that are not late.
+#: States alone explain late actions only if the explanation is at most this many times as large as
+#: that by states and previous actions without a delay, ...
 _ALONE = 1.5
-#: ... and if the delay is less than half of the time for which an action is held, with a margin.
-#: Who goes to and fro between two places turns round half a run after passing the middle.
+#: ... and only if the delay is less than half the time for which actions are held, with a margin: a
+#: shuttle between two places turns half a run after passing the middle.
 _MARGIN = 0.9
-#: Where previous actions bring the explanation to this share, without a delay, a task needs memory;
-#: then a delay of half a run or more has to do as much.
+#: If previous actions reduce the explanation to this share, without a delay, a task needs
+#: memory.  A delay of half a run or more then has to reduce it as much.
 _MUCH_SIMPLER = 1 / 3
-#: Who goes on until something is over looks late, too: a fan that starts at 25 degrees and runs
-#: until it is 22.  Previous actions explain that with so many leaves for each action: where it
-#: begins, and until when it is held.
+#: Hysteresis looks late too: a fan that starts at 25 degrees and runs until 22.  Previous actions
+#: explain it with this many leaves per action: where it begins, and until when it is held.
 _BEGUN_AND_HELD = 2
-#: The explanation must be smaller by that many standard errors, and by that share.
+#: The explanation must be smaller by this many standard errors, and by this share.
 _STANDARD_ERRORS, _SHARE = 1.0, 0.1
-#: A description must be shorter by so many bits: by chance, one of a thousand is.
+#: A description must be shorter by this many bits; by chance, one in a thousand is.
 _BITS = 10.0
-#: Descriptions whose lengths differ by no more bits are equally good; then the delay is short.
+#: Descriptions that differ by no more bits are equally good; the delay is then short.
 _EQUAL_BITS = 4.0
-#: What takes a leaf or an exception for more than this share of the rows explains nothing.
+#: An explanation with more leaves and exceptions than this share of the rows explains nothing.
 _LARGEST = 1 / 3
-#: Borders are clearly rounder if it takes so many bits less to say them: a digit.
+#: Borders are clearly rounder if they take this many bits less: one digit.
 _ROUNDER = math.log2(10)
 
 _WITH_PREVIOUS = Vocabulary(history=History.PREVIOUS)
@@ -87,11 +85,11 @@ _WITH_PREVIOUS = Vocabulary(history=History.PREVIOUS)
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """How long the explanation is if the demonstrator was late by so many rows."""
+    """The size of the explanation for a delay."""
 
     rows: int
     size: float
-    """Leaves and exceptions; or bits."""
+    """Leaves and exceptions, or bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,60 +97,63 @@ class ReactionTime:
     """How late a demonstrator acted."""
 
     rows: int
-    """The delay; 0 unless one is clear."""
+    """The delay in rows; 0 unless one is clear."""
     seconds: float | None
-    """The same in seconds; None where stamps tell no time."""
+    """The delay in seconds; None if stamps are not times."""
     sentence: str
-    """What to tell a person; without a full stop."""
+    """A sentence for people, without a full stop."""
     trials: tuple[Trial, ...] = ()
-    """What decided, by ascending delay; empty where nothing could be compared."""
+    """The trials that decided, by ascending delay; empty if nothing could be compared."""
     by_states_alone: bool = True
-    """Whether these are explanations by states alone; else the previous action is tested, too."""
+    """Whether these are explanations by states alone, without the previous action."""
     in_bits: bool = False
     """Whether sizes are in bits, instead of leaves and exceptions."""
 
 
 def given(table: DemonstrationTable, seconds: float) -> ReactionTime:
-    """A reaction time that a person says.
+    """A reaction time that the user gives.
 
     Raises:
-        OptionError: The table's stamps tell no time.
+        OptionError: The table's stamps are not times.
     """
     rows = rows_in(table, seconds)
     return ReactionTime(
-        rows, seconds, f"actions are learned as of {seconds:g} s ({rows} rows) before, as asked"
+        rows, seconds, f"actions are learned from {seconds:g} s ({rows} rows) before, as requested"
     )
 
 
 def estimate(table: DemonstrationTable) -> ReactionTime:
-    """How late the demonstrator acted, where that is clear.
+    """How late the demonstrator acted, if that is clear.
 
-    Delays up to 0.6 s (6 rows, where stamps tell no time) are tried; the longest one only shows
-    that sizes rise again.  It takes the delay with the smallest explanation by states alone, unless
-    that is much larger than the one by states and previous actions without a delay, or the delay is
-    about half of the time for which actions are held, or longer: then it takes the delay with the
-    smallest explanation by states and previous actions.  For a task that needs memory is hardly
-    explained by states alone; but who goes to and fro between two places looks as if the middle
-    told when to turn round, half a way late.  So where previous actions bring the explanation to a
-    third, without a delay, such a delay is only taken if it does as much.  And who starts something
-    at one border and goes on until another one looks as if late at a border between them: where
-    previous actions explain that with two leaves for each action, states alone have to do clearly
-    better than that.  Of neighbors that are equally small it is the one in the middle; if they
-    reach to the longest delay, as where each state follows from the one before, the first of them;
-    but if the borders of another one that is as small are clearly rounder, it is that.
+    Delays up to 0.6 s (6 rows, if stamps are not times) are tried; the longest one only shows that
+    sizes rise again.
 
-    A delay is clear if its explanation is not larger than a third of the rows, and smaller than the
-    one without a delay by a tenth and by a standard error, where sizes are counts: of a and b, the
-    standard error is the root of a + b.  Where none is clear, it takes the delay with the shortest
-    description by states and previous actions, if that is clear: less than half of the time for
-    which actions are held, and shorter than without a delay by ten bits, a tenth, and a standard
-    error of the exceptions.
+    The best delay has the smallest explanation by states alone.  There are two exceptions, in which
+    it has the smallest explanation by states and previous actions: if states alone explain much
+    worse than states and previous actions without a delay, as in tasks that need memory; and if the
+    delay is about half the time for which actions are held, or longer.
+
+    - A shuttle between two places looks as if it turned in the middle, half a run late.  So if
+      previous actions reduce the explanation to a third, without a delay, such a delay has to
+      reduce it as much.
+    - Starting at one border and continuing until another one looks late at a border between them.
+      If previous actions explain this with two leaves per action, states alone have to do clearly
+      better.
+    - Of adjacent delays with equally small explanations, the middle one counts; if they extend to
+      the longest delay, as when each state follows from the one before, the first one.  If the
+      borders of another equally good delay are clearly rounder, that one counts.
+
+    A delay is clear if its explanation is at most a third of the rows, and smaller than the one
+    without a delay by a tenth and by a standard error (of counts a and b, the root of a + b).  If
+    none is clear, the delay with the shortest description by states and previous actions is taken,
+    if that is clear: less than half the time for which actions are held, and shorter than without a
+    delay by ten bits, a tenth, and a standard error of the exceptions.
 
     Args:
         table: Samples of one channel, in whole demonstrations.
 
     Returns:
-        Deterministic; a delay of 0 where there is nothing to compare.
+        A deterministic result, with delay 0 if there is nothing to compare.
     """
     gap = row_gap(table)
     why_not, most = _most(table, gap)
@@ -173,12 +174,12 @@ def estimate(table: DemonstrationTable) -> ReactionTime:
         counted = f"{rows} row{'s' * (rows > 1)}"
         late = counted if seconds is None else f"{seconds:.2f} s ({counted})"
         sentence = (
-            f"the demonstrator acted {late} late; actions are learned as of when they were due"
+            f"the demonstrator acted {late} late; actions are learned from when they were due"
         )
     return ReactionTime(rows, _seconds(rows, gap), sentence, trials, by_states_alone, in_bits)
 
 
-_NOT_LATE = "no reaction time shows: actions are learned as of when they were taken"
+_NOT_LATE = "no reaction time is found: actions are learned from when they were taken"
 
 
 def _seconds(rows: int, gap: float | None) -> float | None:
@@ -186,42 +187,42 @@ def _seconds(rows: int, gap: float | None) -> float | None:
 
 
 def _most(table: DemonstrationTable, gap: float | None) -> tuple[str, int]:
-    """Why there is nothing to compare, or nothing; and the longest delay to try."""
+    """Why there is nothing to compare (empty if there is), and the longest delay to try."""
     if len(np.unique(table.chosen)) < 2:
-        return "no reaction time shows where one action is taken all the time", 0
+        return "no reaction time can be found if the action is always the same", 0
     if not evenly_spaced(table):
-        return "no reaction time can be read off rows that are not evenly spaced", 0
+        return "no reaction time can be found in rows that are not evenly spaced", 0
     lengths = np.unique(table.demonstration, return_counts=True)[1]
     enough = int(float(np.median(lengths)) * _LOST)
-    # The tolerance keeps jitter from leaving out the last delay.
+    # The tolerance keeps jitter from excluding the last delay.
     most = min(enough, _MOST_ROWS if gap is None else math.floor(_LATEST / gap + 0.1))
     if most < 2:
         short = "demonstrations are too short" if enough < 2 else "rows are too far apart"
-        return f"no reaction time can be told: {short}", 0
+        return f"no reaction time can be found: {short}", 0
     return "", most
 
 
 class _Explanations:
-    """Explanations of the same rows with several delays."""
+    """Explanations of the same rows for several delays."""
 
     def __init__(self, table: DemonstrationTable, most: int) -> None:
         self._table = table
         self._most = most
         place, _ = places(table)
-        # Rows whose state and previous action are known whatever the delay is.
+        # Rows whose state and previous action are known at every delay.
         self._rows = _stretches(np.flatnonzero(place >= most))
         self._half_a_run = _MARGIN * _half_a_run(table)
         self._trees: dict[tuple[int, Vocabulary], FittedTree] = {}
 
     def __len__(self) -> int:
-        """Rows that are explained."""
+        """Number of rows that are explained."""
         return len(self._rows)
 
     def clear(self, trials: Sequence[Trial]) -> int:
         """The delay that is clear, or 0.
 
-        Where the longest one is the best, as half a run late hardly a border is needed any more, it
-        is that of those shorter than half a run, if it brings the explanation to a third.
+        If the longest delay is the best, because half a run late hardly needs a border, it is the
+        best of those shorter than half a run, if that reduces the explanation to a third.
         """
         if _peak(trials) is not trials[-1]:
             return _clear(trials, len(self))
@@ -230,9 +231,9 @@ class _Explanations:
         return _clear(shorter, len(self)) if much_simpler else 0
 
     def described(self) -> tuple[int, tuple[Trial, ...]]:
-        """The delay at which states and previous actions describe the rows clearly best, or 0.
+        """The delay with the clearly shortest description by states and previous actions, or 0.
 
-        And the bits that descriptions take, by ascending delay.
+        Also returns the bits of the descriptions, by ascending delay.
         """
         made: dict[int, Description] = {}
 
@@ -250,7 +251,7 @@ class _Explanations:
             before.bits - after.bits >= least
             and after.bits <= _LARGEST * named_one_by_one
             and best.rows < self._half_a_run
-            # Where the longest delay is clearly better, descriptions may go on to become shorter.
+            # If the longest delay is clearly better, descriptions may become even shorter after it.
             and trials[-1].size >= best.size - _BITS
         )
         return best.rows if clear else 0, trials
@@ -258,11 +259,11 @@ class _Explanations:
     def roundest(
         self, rows: int, trials: Sequence[Trial], by_states_alone: bool, in_bits: bool
     ) -> int:
-        """Of the delays that explain the rows as well, the one with the roundest borders.
+        """The delay with the roundest borders among those that explain the rows as well.
 
         Args:
             rows: A clear delay, kept unless the borders of another one are clearly rounder.
-            trials: What it was found by.
+            trials: The trials that found it.
             by_states_alone: Whether the previous action was not tested.
             in_bits: Whether their sizes are in bits.
         """
@@ -289,11 +290,11 @@ class _Explanations:
         return best if bits[best] <= bits[rows] - _ROUNDER else rows
 
     def trials(self) -> tuple[tuple[Trial, ...], bool]:
-        """What decides, by ascending delay, and whether it is about states alone."""
+        """The trials that decide, by ascending delay, and whether these are by states alone."""
         alone = Trial(0, self._size(0, FEATURES_ALONE))
         without_delay = self._fitted(0, _WITH_PREVIOUS)
         with_previous = Trial(0, without_delay.explanation)
-        # Every action takes a leaf or an exception: nothing can be smaller than that.
+        # Every action takes a leaf or an exception: no explanation is smaller.
         least = len(np.unique(self._table.chosen[self._rows]))
         for one in (alone, with_previous):
             if one.size == least:
@@ -308,8 +309,8 @@ class _Explanations:
         trials = self._around(with_previous, lambda delay: self._size(delay, _WITH_PREVIOUS))
         much_simpler = _peak(trials).size <= _MUCH_SIMPLER * with_previous.size
         if with_previous.size <= _MUCH_SIMPLER * alone.size and not much_simpler:
-            # Half a way late, a task that needs memory seems to need none, and mistakes weigh less:
-            # once each, and not again where they are the previous action.
+            # Half a run late, a task that needs memory seems to need none, and mistakes weigh less:
+            # once each, and not again as the previous action.
             trials = tuple(one for one in trials if one.rows < max(self._half_a_run, 1))
         return trials, False
 
@@ -340,7 +341,7 @@ class _Explanations:
         return fit(self._late(delay), FitOptions(vocabulary=vocabulary))
 
     def _late(self, delay: int) -> DemonstrationTable:
-        """The rows that are explained, with the states of so many rows before."""
+        """The rows that are explained, with the states of the given number of rows earlier."""
         table, rows = self._table, self._rows
         return replace(
             table,
@@ -354,7 +355,7 @@ class _Explanations:
 
 
 def _stretches(rows: IntArray) -> IntArray:
-    """Not too many of the rows: long stretches from everywhere."""
+    """A limited number of the rows: long stretches from all over the table."""
     if len(rows) <= _ROWS:
         return rows
     length = _ROWS // _STRETCHES
@@ -363,11 +364,11 @@ def _stretches(rows: IntArray) -> IntArray:
 
 
 def _half_a_run(table: DemonstrationTable) -> float:
-    """Rows after which someone who goes to and fro turns round, from the place in between.
+    """Rows from a place in between until a shuttle between two places turns.
 
-    Who takes a rows there and b rows back passes one place ab / (a + b) rows before each end: half
-    a run, where both take as long.  The mean over pairs of successive runs; long ones count more,
-    as single rows within a run may be mistakes.  Infinite where there are no such pairs.
+    A shuttle that takes a rows there and b rows back passes one place ab / (a + b) rows before each
+    end: half a run if both take equally long.  This is the mean over pairs of successive runs.
+    Long runs count more, since single rows within a run may be mistakes.  Infinite without pairs.
     """
     begins = np.flatnonzero(table.previous != table.chosen)
     runs = np.diff(np.append(begins, len(table))).astype(np.float64)
@@ -380,9 +381,9 @@ def _half_a_run(table: DemonstrationTable) -> float:
 
 
 def _clear(trials: Sequence[Trial], explained: int) -> int:
-    """The delay that is clear, or 0, where so many rows are explained."""
+    """The clear delay, or 0, given the number of explained rows."""
     without, best = trials[0], _peak(trials)
-    # Where the longest delay is the best, sizes may go on to fall.
+    # If the longest delay is the best, sizes may fall further after it.
     if best is trials[-1] or best.size > _LARGEST * explained:
         return 0
     gain = without.size - best.size
@@ -391,7 +392,7 @@ def _clear(trials: Sequence[Trial], explained: int) -> int:
 
 
 def _peak(trials: Sequence[Trial]) -> Trial:
-    """The delay with the smallest explanation; of equal neighbors, see `estimate`."""
+    """The delay with the smallest explanation; see `estimate` for ties."""
     sizes = [trial.size for trial in trials]
     first = last = sizes.index(min(sizes))
     while last + 1 < len(sizes) and sizes[last + 1] == sizes[first]:
@@ -401,10 +402,10 @@ def _peak(trials: Sequence[Trial]) -> Trial:
 
 
 def _shortest(trials: Sequence[Trial]) -> Trial:
-    """The delay with the shortest description, of all but the longest delay.
+    """The delay with the shortest description, except for the longest delay.
 
-    Of such that are equally good it is the first, or the second of three or more: a border that is
-    passed at one speed is still one a row too early or too late.
+    Of equally good ones, it is the first, or the second of three or more: a border that is passed
+    at constant speed still works one row too early or too late.
     """
     sizes = [trial.size for trial in trials]
     equal = min(sizes[:-1]) + _EQUAL_BITS

@@ -1,4 +1,4 @@
-"""Replay of a behavior tree over recorded rows: where it would have done what was shown."""
+"""Replay of a behavior tree over recorded rows: where it agrees with what was shown."""
 
 from __future__ import annotations
 
@@ -22,49 +22,48 @@ from rebt_ros.learning.late_actions import rows_in, shifted, tells_time
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """A row in which the tree, with its own history, chose something else than was shown."""
+    """A row in which the tree, with its own history, did not choose the shown action."""
 
     demonstration: str
     row: int
     """Position in its demonstration, from 0."""
     seconds: float
-    """Since the first row of its demonstration."""
+    """Seconds since the first row of its demonstration."""
     shown: str
     chosen: str | None
-    """None where the tree chose no action."""
+    """None if the tree chose no action."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Replay:
-    """What a tree did on the recorded rows of one channel."""
+    """The choices of a tree on the recorded rows of a channel."""
 
     channel: str
     rows: int
     teacher_forced_agreement: float
     own_history_agreement: float
     actions: tuple[str, ...]
-    """Labels of the rows and columns of `confusion`: those shown, then others of the tree."""
+    """Labels of the rows and columns of `confusion`: shown ones first, then others of the tree."""
     confusion: IntArray
-    """Rows by what was shown and what was chosen with own history, shape (actions, actions + 1);
-    the last column counts rows in which no action was chosen."""
+    """Rows by shown action and by choice with own history, shape (actions, actions + 1); the last
+    column counts rows without a choice."""
     disagreements: tuple[Disagreement, ...]
     foreign: Mapping[str, int]
-    """Labels that were shown and that are no actions of the tree, and in how many rows."""
+    """Shown labels that are not actions of the tree, and their numbers of rows."""
 
 
 def replay(learned: LearnedTree, demonstrations: Sequence[Demonstration]) -> tuple[Replay, ...]:
     """Runs a tree over recorded rows, in their order.
 
-    Where the demonstrator was late when the tree was learned, the same delay is undone in the
-    recorded actions first.
+    If the tree was learned from late actions, the same delay is first undone in the recorded ones.
 
     Args:
         learned: The tree.
-        demonstrations: What was recorded.  A tree of one channel is run over a recording of one
+        demonstrations: The recorded rows.  A tree of one channel runs over a recording of one
             channel, whatever their names; otherwise channels are matched by name.
 
     Returns:
-        One for each channel of the tree that was recorded.
+        One result for each channel of the tree that was recorded.
 
     Raises:
         InputError: There are no rows, or they lack a channel or a feature that the tree tests.
@@ -82,7 +81,7 @@ def rows_for(
     """Recorded rows as a tree reads them, with its features and channels; see `replay`.
 
     Returns:
-        One for each channel of the tree that was recorded.
+        One result for each channel of the tree that was recorded.
 
     Raises:
         InputError: There are no rows, or they lack a channel or a feature that the tree tests.
@@ -110,14 +109,14 @@ def rows_for(
 
 
 def agreement_on(learned: LearnedTree, table: DemonstrationTable) -> float | None:
-    """Own-history agreement of a tree with rows that another one was judged on.
+    """Own-history agreement of a tree with rows that another tree was judged on.
 
     Args:
         learned: The tree.
-        table: Rows of one channel, as they were learned from.
+        table: Rows of one channel, in the form that trees are learned from.
 
     Returns:
-        None where there are no rows, or where the tree is about other channels or features.
+        None if there are no rows, or if the tree has other channels or features.
     """
     policy = nodes.policies(learned.tree).get(table.channel)
     if policy is None or not len(table):
@@ -130,7 +129,7 @@ def agreement_on(learned: LearnedTree, table: DemonstrationTable) -> float | Non
 
 
 def _late(learned: LearnedTree, table: DemonstrationTable) -> int:
-    """The rows by which the demonstrator was late when the tree was learned, in this recording."""
+    """The delay that the tree was learned with, in rows of this recording."""
     seconds, rows = learned.provenance.late_seconds, learned.provenance.late_rows
     return rows_in(table, seconds) if seconds is not None and tells_time(table) else rows
 
@@ -139,7 +138,7 @@ def _replay(learned: LearnedTree, policy: nodes.Node, table: DemonstrationTable)
     own = evaluation.own_history_choices(policy, table)
     forced = evaluation.teacher_forced_choices(policy, table)
     confusion = np.zeros((len(table.actions), len(table.actions) + 1), dtype=np.int64)
-    # NO_ACTION is -1 and so counts in the last column.
+    # NO_ACTION is -1, the last column.
     np.add.at(confusion, (table.chosen, own), 1)
     return Replay(
         table.channel,
@@ -154,7 +153,7 @@ def _replay(learned: LearnedTree, policy: nodes.Node, table: DemonstrationTable)
 
 
 def _foreign(learned: LearnedTree, table: DemonstrationTable) -> dict[str, int]:
-    """Labels that were shown and that the tree does not know, and in how many rows."""
+    """Shown labels that the tree does not have, and their numbers of rows."""
     known = {action.label for action in learned.actions if action.channel == table.channel}
     rows = np.bincount(table.chosen, minlength=len(table.actions)).tolist()
     return {
@@ -182,7 +181,7 @@ def _disagreements(table: DemonstrationTable, chosen: IntArray) -> tuple[Disagre
 def _as_the_tree_reads(
     learned: LearnedTree, channel: str, policy: nodes.Node, table: DemonstrationTable
 ) -> DemonstrationTable:
-    """The rows with the tree's features and channel, and with all of its actions known."""
+    """The rows with the features, the channel and all actions of the tree."""
     tested = nodes.features(policy)
     recorded = {feature.name: place for place, feature in enumerate(table.features)}
     missing = sorted(tested - set(recorded))

@@ -1,17 +1,18 @@
 """What a person must know about a learned tree before it drives.
 
 recall
-    Of an action: the share of its rows on which the tree takes it, in cross-validation.
+    The recall of an action is the share of its rows on which the tree takes it, in
+    cross-validation.
 conflict
-    A row for which another row has an equal state and another action: there is no tree of the
-    state alone that does both.
+    A row for which another row has an equal state and another action: no tree of states alone can
+    do both.
 """
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,61 +24,61 @@ from rebt_ros.demonstration.equal_states import codes_of_states
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import number_of
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import listing
 from rebt_ros.learning.judged_levels import JudgedLevels
 from rebt_ros.learning.sample_report import SampleReport
 
-#: How well agreement in cross-validation ranks the trees of one task by their success (Spearman's
-#: rho): 0.6 where trees of the same demonstrations were compared, 0.2 over sets and numbers of
-#: demonstrations in docs/driving.md.
+#: How well agreement in cross-validation ranks the trees of a task by success (Spearman's rho): 0.6
+#: for trees of the same demonstrations, 0.2 over sets and numbers of demonstrations
+#: (docs/driving.md).
 FORECAST = "weak: rank correlation with success 0.2 to 0.6 within a task"
 
-#: So many actions are listed in a sentence.
+#: Number of actions that a sentence lists.
 _LISTED = 12
 
 #: What people put around and between words.
 _QUOTES = " \t\"'`“”\u2018\u2019«»"
 _BETWEEN_WORDS = re.compile(r"(?<=[^\W\d_])[-_\s]+(?=[^\W\d_])|\s+")
 
-#: Conflicts that are mentioned: the share of the rows from which on they matter.
+#: Conflicts are mentioned from this share of the rows on.
 _MENTIONED = 0.001
 
 
 @dataclass(frozen=True, slots=True)
 class ActionReport:
-    """What became of an action that was shown."""
+    """How well a shown action was learned."""
 
     label: str
     rows: int
-    """On which it was shown."""
+    """Number of rows in which it was shown."""
     recall: float | None
-    """None where there were too few rows for cross-validation."""
+    """None if there were too few rows for cross-validation."""
     taken: bool
-    """Whether the tree takes it anywhere."""
+    """Whether the tree ever takes it."""
 
 
 @dataclass(frozen=True, slots=True)
 class LearningReport:
-    """What a person must know about the policy of one channel."""
+    """What a person must know about the policy of a channel."""
 
     actions: tuple[ActionReport, ...]
     mean_recall: float | None
     agreement: float | None
-    """In cross-validation, after what the demonstrator did before: the forecast of success."""
+    """Agreement in cross-validation, after the demonstrator's actions: the forecast of success."""
     most_frequent: float
-    """Share of the rows that always taking the most frequent action would agree with, by their
-    weights."""
+    """Weighted share of rows that always taking the most frequent action would agree with."""
     conflicts: int
     """Rows."""
     conflicts_after_history: int
-    """Rows in conflict with others before which the same was done, where the tree may test it."""
+    """Rows in conflict with others after the same action, if the tree may test it."""
     rows: int
     weighted: bool = False
-    """Whether demonstrations have weights, by which rows count in cross-validation."""
+    """Whether demonstrations have weights, which count in cross-validation."""
     sample: SampleReport | None = None
-    """What the structure of the tree was grown on; None for all rows."""
+    """The sample that the structure of the tree was grown on; None for all rows."""
 
     def notes(self) -> Iterator[str]:
-        """What should make a person look twice; no full stops."""
+        """Warnings; no full stops."""
         if self.weighted:
             yield (
                 "demonstrations have weights: trees are grown, and recalls and agreement in "
@@ -95,7 +96,7 @@ class LearningReport:
         for same in alike.values():
             if len(same) > 1:
                 looks = {unicodedata.normalize("NFKC", label) for label in same}
-                # What looks the same is told apart by its code points.
+                # Labels that look the same are distinguished by their code points.
                 shown = repr if len(looks) == len(same) else ascii
                 named = ", ".join(map(shown, same))
                 yield f"{named} are different actions: write them alike if they are one"
@@ -111,7 +112,7 @@ class LearningReport:
             )
 
     def in_short(self) -> str:
-        """Sentences for a service's answer: recalls, the least first, and what to hold against."""
+        """Sentences for a service's answer: recalls, the lowest first, and a baseline."""
         simplest = f"always taking the most frequent action would reach {self.most_frequent:.1%}"
         if self.mean_recall is None or self.agreement is None:
             said = f"There is no forecast, as there are too few rows; {simplest}."
@@ -120,12 +121,12 @@ class LearningReport:
             recalls = [f"{recall:.1%} of {label!r}" for recall, label in sorted(judged)]
             said = (
                 f"Forecast: {self.agreement:.1%} agreement in cross-validation ({FORECAST}), where "
-                f"{simplest}; mean recall {self.mean_recall:.1%}: {_listed(recalls)}."
+                f"{simplest}; mean recall {self.mean_recall:.1%}: {listing(recalls, _LISTED)}."
             )
         if self.sample is not None:
             said = f"{self.sample.sentence} {said}"
         never = [repr(one.label) for one in self.actions if not one.taken]
-        return f"{said} Never taken: {_listed(never)}." if never else said
+        return f"{said} Never taken: {listing(never, _LISTED)}." if never else said
 
     def as_json(self) -> dict[str, Any]:
         """For summary.json."""
@@ -166,12 +167,12 @@ def report_on(
     """Reports on a policy.
 
     Args:
-        table: What it was learned from.
+        table: The rows that it was learned from.
         tree: The behavior tree.
-        history: What it may test of what was done before.
+        history: Which earlier action it may test.
         levels: The pruning levels in cross-validation, if there was one.
-        ccp_alpha: The level that was chosen.
-        sample: What the structure of the tree was grown on; None for all rows.
+        ccp_alpha: The chosen level.
+        sample: The sample that the structure of the tree was grown on; None for all rows.
     """
     shown = np.bincount(table.chosen, minlength=len(table.actions))
     weighed = table.counts(table.chosen, len(table.actions))
@@ -205,7 +206,7 @@ def report_on(
 
 
 def _conflicts(situations: IntArray, chosen: IntArray) -> int:
-    """Rows in whose situation several actions were chosen."""
+    """Rows whose situation has several actions."""
     _, of_row = np.unique(situations, return_inverse=True)
     count = int(of_row.max()) + 1
     least, most = np.full(count, np.iinfo(np.int64).max), np.full(count, -1, dtype=np.int64)
@@ -215,18 +216,14 @@ def _conflicts(situations: IntArray, chosen: IntArray) -> int:
 
 
 def _as_meant(label: str) -> str | float:
-    """What labels have in common that people write for one action.
+    """A label in a form that is the same for all ways to write it.
 
-    Case, blanks, hyphens and underscores between words, quotes, Unicode forms and ways to write a
-    number do not count.
+    It ignores case, blanks, hyphens and underscores between words, quotes, Unicode forms, and ways
+    to write a number.
     """
     text = unicodedata.normalize("NFKC", label).casefold().strip(_QUOTES)
     number = number_of(text)
     return _BETWEEN_WORDS.sub(" ", text) if number is None else number
-
-
-def _listed(words: Sequence[str]) -> str:
-    return ", ".join(words[:_LISTED]) + (", ..." if len(words) > _LISTED else "")
 
 
 def _share(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""What a tree whose structure was grown on a sample says of the sample, and of all rows."""
+"""How well a tree that was grown on a sample agrees with the sample and with all rows."""
 
 from __future__ import annotations
 
@@ -11,42 +11,42 @@ from rebt_ros.arrays import IntArray
 from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.demonstration.sampling import Sample
 from rebt_ros.demonstration.table import DemonstrationTable
+from rebt_ros.errors import listing
 from rebt_ros.learning.evaluation import mean_recall
 
-#: So many actions are listed in a sentence.
+#: Number of actions that a sentence lists.
 _LISTED = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """How well a decision tree agrees with rows that it was learned from, by their weights."""
+    """Weighted agreement of a decision tree with rows that it was learned from."""
 
     agreement: float
     mean_recall: float
-    """Over the actions."""
+    """Mean over the actions."""
 
 
 @dataclass(frozen=True, slots=True)
 class SampleReport:
-    """What the structure of a tree was grown on, beside all rows that it was learned from."""
+    """The sample that the structure of a tree was grown on, compared with all rows."""
 
     rows: int
     of_rows: int
     demonstrations: int
     of_demonstrations: int
     complete: tuple[str, ...]
-    """Actions of which no row is left out."""
+    """Actions with all their rows in the sample."""
     sampled: Fit
-    """The tree on the rows of the sample."""
+    """Agreement with the rows of the sample."""
     whole: Fit
-    """The tree on all rows."""
+    """Agreement with all rows."""
 
     @property
     def sentence(self) -> str:
-        """All of it, for people."""
-        named = ", ".join(map(repr, self.complete[:_LISTED]))
-        more = ", ..." if len(self.complete) > _LISTED else ""
-        complete = f", all that show {named}{more} among them" if self.complete else ""
+        """The report, for people."""
+        named = listing([*map(repr, self.complete)], _LISTED)
+        complete = f", all that show {named} among them" if self.complete else ""
         return (
             f"The tree was grown on a sample of {self.rows} of {self.of_rows} rows "
             f"({self.demonstrations} of {self.of_demonstrations} demonstrations{complete}), and "
@@ -66,8 +66,8 @@ def report_on_sample(
     """Reports on a sample.
 
     Args:
-        sample: Of the table.
-        table: What the tree was learned from.
+        sample: The sample of the table.
+        table: The rows that the tree was learned from.
         trained: The tree.
     """
     rows = table.where(sample.rows)
@@ -86,7 +86,7 @@ def report_on_sample(
 
 
 def _counted_hits(trained: TrainedTree) -> IntArray:
-    """The rows of each action that the tree predicts, of those it counts, shape (actions,)."""
+    """The counted rows of each action that the tree predicts, shape (actions,)."""
     grown = trained.grown
     leaves = np.unique(trained.standing[grown.left < 0])
     majority = grown.majority[leaves]

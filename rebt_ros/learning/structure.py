@@ -1,4 +1,4 @@
-"""Which rows the structure of decision trees is grown on, where there are very many."""
+"""Which rows of a very large table the structure of decision trees is grown on."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from rebt_ros.demonstration.sampling import Sample, sample_of
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning.options import LearnOptions
 
-#: In larger tables, trees are grown on a sample of about so many rows.
+#: In larger tables, trees are grown on a sample of about this many rows.
 MOST_ROWS_GROWN_ON: Final = 100_000
 
 
 def structure_sample(table: DemonstrationTable, options: LearnOptions) -> Sample | None:
-    """The rows that splits are chosen by; all rows prune, choose and are counted in any case.
+    """The rows that choose the splits; pruning, choices and counts always use all rows.
 
     Args:
-        table: What is learned from.
-        options: How.
+        table: The rows to learn from.
+        options: How to learn.
 
     Returns:
-        None where trees are grown on all rows: of 100,000 at most, where that is asked for, and
-        where rows are made up for rare actions, which would count for nothing otherwise.
+        None if trees are grown on all rows: up to 100,000 rows, on request, and with upsampling,
+        whose made-up rows would have no effect otherwise.
     """
     if options.exact or options.upsample is not Upsampling.NONE:
         return None

@@ -24,28 +24,28 @@ from rebt_ros.paper.lat_trees import gen_lat_trees
 from rebt_ros.paper.rule_trees import build_inv_set, logic_minimizer, reduce_floats
 from rebt_ros.paper.rules import dt_to_rules_psa
 
-#: More than a person wants to look through, and how many of them may be routines.
+#: Maximum number of suggestions, and of routines among them.
 _MOST_SUGGESTIONS = 12
 _MOST_ROUTINES = 8
-#: Repeaters of single loops, in the paper's mode and beside routines: where no routines are found,
-#: rows are samples, and an action that is done for long is no loop.
+#: Maximum number of Repeaters of single loops, in the paper's mode and beside routines.  Without
+#: routines, rows are samples, and an action that is done for long is not a loop.
 _MOST_LOOPS, _LOOPS_BESIDE_ROUTINES = 24, 4
 _TOO_LARGE = (
     f"no PSA nodes and LAT trees are suggested for more than {MOST_LEAVES_MINIMIZED} leaves: prune "
     "more"
 )
 
-#: Rows in which LAT paths are counted: what has not occurred in so many is no habit, and counting
-#: nested loops takes longer than learning does in many more.
+#: Rows in which LAT paths are counted: what has not occurred in this many is no habit, and in many
+#: more, counting nested loops takes longer than learning.
 _MOST_ROWS = 100_000
-#: Rows that the LAT-augmented tree is fitted to.
+#: Maximum number of rows that the LAT-augmented tree is fitted to.
 _MOST_ROWS_FITTED = 5_000
 
 
 def occurrences_in(table: DemonstrationTable) -> Occurrences:
-    """What was done in a table, row by row; it is the same at all pruning levels.
+    """The actions of a table, row by row, which are the same at all pruning levels.
 
-    Of a large table, only in its first rows.
+    In a large table, only those of the first rows.
     """
     return Occurrences(rows(table.where(np.arange(len(table)) < _MOST_ROWS)))
 
@@ -58,20 +58,20 @@ def suggest(
     routines: Sequence[FoundRoutine] = (),
     occurrences: Occurrences | None = None,
 ) -> tuple[tuple[Suggestion, ...], tuple[str, ...]]:
-    """What to offer: PSA nodes of the tree, and what a LAT-augmented tree tells about sequences.
+    """What to offer: PSA nodes, routines, and the sequences of a LAT-augmented tree.
 
     Args:
         table: The rows that were learned from.
         trained: The decision tree of the main tree.
         ccp_alpha: How far the LAT-augmented decision tree is pruned.
         options: How to learn.
-        routines: What `find_routines` found in the table.
-        occurrences: What `occurrences_in` makes of the table, which saves time where several
-            trees are learned from it.
+        routines: The result of `find_routines` for the table.
+        occurrences: The result of `occurrences_in` for the table, which saves time if several trees
+            are learned from it.
 
     Returns:
-        At most twelve suggestions, routines first, then those that were shown in most rows (all of
-        them in the paper's mode), and notes on what was left out.
+        At most twelve suggestions, routines first, then those shown in most rows (all of them in
+        the paper's mode), and notes on what was left out.
     """
     found = routine_suggestions(routines[:_MOST_ROUTINES])
     left_out = len(routines) - len(found)
@@ -100,7 +100,7 @@ def suggest(
 
 
 def _on_left_out(suggestions: int) -> tuple[str, ...]:
-    """The note on so many."""
+    """The note on suggestions that were left out."""
     if not suggestions:
         return ()
     return (f"{suggestions} more, less supported suggestions are left out",)
@@ -124,10 +124,10 @@ def _of_rules(
     Args:
         table: The rows that were learned from.
         trained: The decision tree of the main tree.
-        with_lat: The one that may test LAT.
+        with_lat: The decision tree that may test LAT.
         options: How to learn.
-        routines: Which there are.
-        occurrences: In the table, if they are known.
+        routines: The routines found.
+        occurrences: Those of the table, if known.
     """
     psa_rules = reduce_floats(logic_minimizer(dt_to_rules_psa(trained.tree, options.delta)))
     rules = dt_to_rules_psa(with_lat.tree, options.delta)

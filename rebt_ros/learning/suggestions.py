@@ -1,6 +1,6 @@
 """Suggested alternate expressive subtrees (SAES): what is offered.
 
-Suggestions overlap with the main tree, so that nothing is attached until the user asks for it.
+Suggestions overlap with the main tree, so nothing is attached until the user asks for it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def psa_suggestions(
 
     Args:
         rules: Minimized and float-reduced; their support is in training rows.
-        inv_set: Literals to be shown as Inverters (Algorithm 1, line 3).
+        inv_set: Literals to show as Inverters (Algorithm 1, line 3).
     """
     groups = sorted((rule for rule in rules if len(rule.actions) > 1), key=lambda one: -one.support)
     return _numbered(
@@ -52,7 +52,7 @@ def lat_suggestions(trees: Iterable[LatTree]) -> tuple[Suggestion, ...]:
 
 
 def routine_suggestions(found: Iterable[FoundRoutine]) -> tuple[Suggestion, ...]:
-    """Routines in their order."""
+    """Suggestions of routines, in the order of the routines."""
     return _numbered(
         (
             SuggestionKind.REPEATER

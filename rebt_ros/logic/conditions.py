@@ -9,7 +9,7 @@ quantity
 literal
     A condition or its negation.
 
-A missing value makes every condition on it false, so ``~(x <= 3)`` holds where x is missing.
+A missing value makes every condition on it false, so ``~(x <= 3)`` holds if x is missing.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ import math
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-#: Threshold under which every value lies that is not missing.
+#: Threshold that every known value is below.
 KNOWN = 1.7976931348623157e308
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """``minuend - subtrahend``, computed in double precision; missing where either one is."""
+    """``minuend - subtrahend``, computed in double precision; missing if either is missing."""
 
     minuend: str
     subtrahend: str
@@ -43,23 +43,23 @@ class Difference:
 class WeightedSum:
     """``angle + 0.4 × spin``, computed in double precision from left to right.
 
-    It is missing where any of its features is.
+    It is missing if any of its features is.
     """
 
     terms: tuple[tuple[str, float], ...]
-    """Features with their weights: two features at least, and weights that are not 0."""
+    """Features with their weights: at least two features, and no weight of 0."""
 
     def __post_init__(self) -> None:
         names = tuple(name for name, _ in self.terms)
         if len(names) < 2 or len(set(names)) < len(names):
             raise ValueError(
-                f"a weighted sum is of two different features at least, not of {', '.join(names)}"
+                f"a weighted sum needs at least two different features, not {', '.join(names)}"
             )
         for name, weight in self.terms:
             if not math.isfinite(weight) or not weight:
                 raise ValueError(f"the weight of {name!r} must be finite and not 0, not {weight}")
         if tuple(weight for _, weight in self.terms) == (1.0, -1.0):
-            raise ValueError(f"{names[0]!r} less {names[1]!r} is a difference, no weighted sum")
+            raise ValueError(f"{names[0]!r} less {names[1]!r} is a difference, not a weighted sum")
 
 
 #: What is computed from several numeric features.
@@ -73,7 +73,7 @@ def combination(terms: tuple[tuple[str, float], ...]) -> Combination:
     Difference(minuend='left', subtrahend='right')
 
     Raises:
-        ValueError: There is no such combination.
+        ValueError: They make no combination.
     """
     match terms:
         case ((minuend, 1.0), (subtrahend, -1.0)):
@@ -135,7 +135,7 @@ class HasCategory:
 
 @dataclass(frozen=True, slots=True)
 class PreviousActionIs:
-    """The previous action: that of the row before; false in the first row of a demonstration."""
+    """The previous action, that of the row before; false in the first row of a demonstration."""
 
     action: str
 
@@ -145,17 +145,17 @@ class LastActionIs:
     """``LAT = action``: the last action taken (paper, III-B).
 
     LAT is the most recent action that differs from the one being decided.  A decision tree reads
-    it from a column, where that action is known; a behavior tree is still choosing, so there the
-    condition names in `deciding` the action, or PSA group of actions, of the rule it stands in.
+    it from a column, for which that action is known.  A behavior tree is still choosing, so its
+    conditions name in `deciding` the action, or PSA group of actions, of their rule.
     """
 
     action: str
     deciding: tuple[str, ...] = ()
 
 
-#: What a state alone tells.
+#: Conditions that the state alone decides.
 StateCondition: TypeAlias = Threshold | Interval | IsTrue | HasCategory
-#: What was done before tells.
+#: Conditions that earlier actions decide.
 HistoryCondition: TypeAlias = PreviousActionIs | LastActionIs
 Condition: TypeAlias = StateCondition | HistoryCondition
 
@@ -195,7 +195,7 @@ class Literal:
 
 
 def deciding(literal: Literal, actions: tuple[str, ...]) -> Literal:
-    """The literal as it is meant in a rule that triggers `actions`; only LAT literals change."""
+    """The literal as a rule that triggers `actions` means it; only LAT literals change."""
     if isinstance(literal.condition, LastActionIs):
         return replace(literal, condition=replace(literal.condition, deciding=actions))
     return literal

@@ -1,7 +1,7 @@
 """Conjunctions and disjunctive normal forms (DNF).
 
-The literals of a conjunction and the conjunctions of a DNF are ordered, so that what is printed,
-drawn and compared is the same in every run.  Their order has no logical meaning.
+The literals of a conjunction and the conjunctions of a DNF are ordered, which makes printing,
+drawing and comparing deterministic.  Their order has no logical meaning.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Conjunction:
     def __post_init__(self) -> None:
         conditions = {literal.condition for literal in self.literals}
         if len(conditions) != len(self.literals):
-            raise ValueError(f"a conjunction names each condition once, not {self.literals}")
+            raise ValueError(f"a conjunction may name a condition only once, not {self.literals}")
 
     def __iter__(self) -> Iterator[Literal]:
         return iter(self.literals)
@@ -30,7 +30,7 @@ class Conjunction:
         return len(self.literals)
 
     def without(self, literals: frozenset[Literal]) -> Conjunction:
-        """The conjunction less the given literals, in the same order."""
+        """The conjunction without the given literals, in the same order."""
         return Conjunction(tuple(literal for literal in self.literals if literal not in literals))
 
 

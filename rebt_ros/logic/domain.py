@@ -1,10 +1,9 @@
-"""What conditions say about each other: combinations that no state has.
+"""How conditions depend on each other: combinations that no state has.
 
-Espresso minimizes over free variables.  Conditions are not free: of two thresholds the lower one
-implies the higher one, and a feature has at most one category, as the previous action and LAT are
-at most one action.
-Handed to espresso as don't-cares, the infeasible combinations make smaller rules that are the same
-in every state.
+Espresso minimizes over free variables.  Conditions are not free: of two thresholds, the lower one
+implies the higher one; a feature has at most one category; and the previous action and LAT are at
+most one action each.  Passed to espresso as don't-cares, infeasible combinations give smaller rules
+that are equal in every state.
 """
 
 from __future__ import annotations
@@ -27,10 +26,10 @@ from rebt_ros.logic.dnf import Conjunction, Dnf
 
 
 def spelled_out(dnf: Dnf, conditions: Iterable[Condition]) -> Dnf:
-    """The DNF with the literals that its own literals imply, of the given conditions.
+    """The DNF, with all literals of the given conditions that its own literals imply.
 
-    Two conjunctions that hold in some state, one of them spelled out, have an assignment in common
-    only if they have a state in common.
+    If one of two feasible conjunctions is spelled out, they share an assignment only if they share
+    a state.
 
     >>> near, reachable = Threshold("x", 0.3), Threshold("x", 0.5)
     >>> spelled_out(Dnf((Conjunction((Literal(near),)),)), [near, reachable]) == Dnf(
@@ -45,14 +44,14 @@ def spelled_out(dnf: Dnf, conditions: Iterable[Condition]) -> Dnf:
     for conjunction in dnf:
         implied = (one for literal in conjunction for one in _implied(literal, related))
         literals = dict.fromkeys((*conjunction, *implied))
-        # One that contradicts itself holds in no state.
+        # A conjunction that contradicts itself holds in no state.
         if not any(~literal in literals for literal in literals):
             spelled.append(Conjunction(tuple(literals)))
     return Dnf(tuple(spelled))
 
 
 def _subject(condition: Condition) -> Hashable:
-    """What a condition is about; conditions about different things say nothing of each other."""
+    """What a condition is about; conditions about different things are independent."""
     match condition:
         case LastActionIs(deciding=deciding):
             return LastActionIs, deciding
@@ -84,7 +83,7 @@ def _implied(
 
 
 def infeasible(conditions: Iterable[Condition]) -> Dnf:
-    """The combinations of conditions that no state has, as a DNF that is linear in thresholds.
+    """The combinations of conditions that no state has, as a DNF linear in the thresholds.
 
     >>> near, reachable = Threshold("x", 0.3), Threshold("x", 0.5)
     >>> infeasible([reachable, near]) == Dnf(
@@ -101,10 +100,10 @@ def infeasible(conditions: Iterable[Condition]) -> Dnf:
             case HasCategory() | PreviousActionIs() | LastActionIs():
                 exclusive.setdefault(_subject(condition), []).append(condition)
             case IsTrue() | Interval():
-                # Nothing is said of intervals, which are made of rules that are minimized already.
+                # There are no intervals yet: they are made from minimized rules.
                 pass
-    # Neighbors are enough: below the first but not below the third threshold means not to lie
-    # between one of the two pairs of neighbors.
+    # Pairs of neighbors are enough: being below a threshold but not below a higher one violates
+    # one of the pairs between them.
     lower_without_higher = (
         Conjunction((Literal(lower), ~Literal(higher)))
         for group in thresholds.values()

@@ -1,6 +1,6 @@
 """Factoring by the distributive law.
 
-`pull_out_common` is the paper's one level (Algorithm 1, line 6), `factor` repeats it.
+`pull_out_common` is the paper's single level (Algorithm 1, line 6); `factor` repeats it.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from rebt_ros.logic.literal_codes import Codes, Cover, Numbering, mask
 
 @dataclass(frozen=True, slots=True)
 class Factored:
-    """``common AND (OR of alternatives)``; without alternatives it is ``common`` alone."""
+    """``common AND (OR of alternatives)``; without alternatives, only ``common``."""
 
     common: tuple[Literal, ...]
     alternatives: tuple[Factored, ...] = ()
 
 
 def unfactored(dnf: Dnf) -> Factored:
-    """The DNF as it is: nothing in common."""
+    """The DNF as it is, with nothing in common."""
     conjunctions = tuple(Factored(conjunction.literals) for conjunction in dnf)
     return conjunctions[0] if len(conjunctions) == 1 else Factored((), conjunctions)
 
 
 def pull_out_common(dnf: Dnf) -> Factored:
-    """One level of factoring, as in the paper: literals of all conjunctions come to the front.
+    """One level of factoring, as in the paper: literals of all conjunctions move to the front.
 
     Args:
         dnf: At least one conjunction, none of which implies another (as espresso leaves it).
@@ -42,10 +42,10 @@ def pull_out_common(dnf: Dnf) -> Factored:
 
 
 def factor(dnf: Dnf) -> Factored:
-    """Repeated factoring: what is common to several conjunctions is pulled out, again and again.
+    """Repeated factoring: divides out what several conjunctions have in common, until nothing is.
 
-    Of the literals that occur in several conjunctions, the most frequent one is divided out first
-    (the first of equals), then quotient and remainder are factored likewise.
+    The literal that occurs in most conjunctions is divided out first (of equals, the first one);
+    then quotient and remainder are factored in the same way.
 
     Args:
         dnf: At least one conjunction, none of which implies another (as espresso leaves it).
@@ -55,14 +55,14 @@ def factor(dnf: Dnf) -> Factored:
 
 
 class FactoredCodes(NamedTuple):
-    """`Factored` in numbers."""
+    """`Factored`, with literals as codes."""
 
     common: Codes
     alternatives: tuple[FactoredCodes, ...] = ()
 
 
 def named(parts: FactoredCodes, numbering: Numbering) -> Factored:
-    """What was factored in numbers, in literals."""
+    """A factored condition, with its codes as literals."""
     return Factored(
         numbering.literals(parts.common),
         tuple(named(alternative, numbering) for alternative in parts.alternatives),
@@ -70,19 +70,19 @@ def named(parts: FactoredCodes, numbering: Numbering) -> Factored:
 
 
 def factored(cover: Cover) -> FactoredCodes:
-    """`factor` in numbers."""
+    """`factor` for codes."""
     common, rest = _pulled_out(cover)
     return FactoredCodes(common, tuple(_divided(rest)))
 
 
 def pulled_out(cover: Cover) -> FactoredCodes:
-    """`pull_out_common` in numbers."""
+    """`pull_out_common` for codes."""
     common, rest = _pulled_out(cover)
     return FactoredCodes(common, tuple(map(FactoredCodes, rest)))
 
 
 def _pulled_out(cover: Cover) -> tuple[Codes, Cover]:
-    """What all conjunctions have in common, and the rest of each; of one there is no rest."""
+    """What all conjunctions have in common, and the rest of each; a single one has no rest."""
     if len(cover) == 1:
         return cover[0], ()
     shared = reduce(and_, map(mask, cover))

@@ -16,9 +16,9 @@ from rebt_ros.logic.literal_codes import Codes, Numbering, mask
 def float_reduction(dnf: Dnf) -> Dnf:
     """The DNF without literals and conjunctions that others subsume.
 
-    Within a conjunction the strongest of several thresholds on one side stays; of two
-    conjunctions of which one implies the other, the weaker stays.  The truth value is unchanged
-    in every state.
+    Within a conjunction, only the strictest of several thresholds on one side stays.  If one of two
+    conjunctions implies the other, the weaker one stays.  The truth value is the same in every
+    state.
     """
     numbering = Numbering(conditions_of(dnf))
     implied = implied_literals(numbering.conditions)
@@ -26,14 +26,14 @@ def float_reduction(dnf: Dnf) -> Dnf:
 
 
 def implied_literals(conditions: Sequence[Condition]) -> list[int]:
-    """For each code, the mask of the literals that hold where it holds, itself included."""
+    """For each code, the mask of the literals that it implies, including itself."""
     implied = [1 << code for code in range(2 * len(conditions))]
     of_quantity: dict[Quantity, list[tuple[float, int]]] = {}
     for position, condition in enumerate(conditions):
         if isinstance(condition, Threshold):
             of_quantity.setdefault(condition.quantity, []).append((condition.value, position))
     for thresholds in of_quantity.values():
-        # A positive literal implies those of higher thresholds, a negative one of lower ones.
+        # A positive literal implies those of higher thresholds, a negative one those of lower ones.
         for positive, ordered in ((1, sorted(thresholds, reverse=True)), (0, sorted(thresholds))):
             weaker = 0
             for _, position in ordered:
@@ -43,7 +43,7 @@ def implied_literals(conditions: Sequence[Condition]) -> list[int]:
 
 
 def reduced(cover: Iterable[Codes], implied: Sequence[int]) -> list[Codes]:
-    """`float_reduction` of a cover.
+    """`float_reduction` for a cover.
 
     Args:
         cover: The conjunctions.
@@ -52,7 +52,7 @@ def reduced(cover: Iterable[Codes], implied: Sequence[int]) -> list[Codes]:
     distinct: dict[int, Codes] = {}
     for conjunction in cover:
         strongest = _strongest(conjunction, implied)
-        # Two that differ in nothing but the order of their literals would subsume each other.
+        # Two that differ only in the order of their literals would subsume each other.
         distinct.setdefault(mask(strongest), strongest)
     wanted = list(distinct)
     kept: list[Codes] = []

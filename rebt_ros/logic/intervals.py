@@ -1,7 +1,7 @@
 """Two thresholds on one quantity as one interval, as a person writes it.
 
-Not ``x <= 0.3`` and ``x <= 0.5`` is ``0.3 < x <= 0.5``.  Both are false where x is missing, so that
-the truth value is unchanged in every state.
+*Not* ``x <= 0.3`` and ``x <= 0.5`` is ``0.3 < x <= 0.5``.  Both are false if x is missing, so the
+truth value is the same in every state.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def with_intervals(condition: Factored) -> Factored:
     """The condition with intervals in place of the pairs of thresholds in each conjunction.
 
     Args:
-        condition: Factored already: as one condition, a pair cannot be pulled apart any more.
+        condition: Already factored: factoring cannot separate a pair that is one condition.
     """
     return Factored(
         merged(condition.common),
@@ -28,7 +28,7 @@ def with_intervals(condition: Factored) -> Factored:
 
 
 def merged(conjunction: Iterable[Literal]) -> tuple[Literal, ...]:
-    """The literals with each pair as one interval, which stands where the first of the two stood.
+    """The literals, with each pair as one interval in the place of the first of the two.
 
     >>> near, reachable = Literal(Threshold("x", 0.3)), Literal(Threshold("x", 0.5))
     >>> merged((reachable, ~near))
@@ -49,14 +49,14 @@ def merged(conjunction: Iterable[Literal]) -> tuple[Literal, ...]:
 
 
 def enclosing_literals(conditions: Sequence[Condition]) -> list[int]:
-    """For each code, the mask of the literals with which it is an interval; none but for ``>``."""
+    """For each code, the mask of the literals with which it forms an interval; only for ``>``."""
     enclosing = [0] * (2 * len(conditions))
     of_quantity: dict[Quantity, list[tuple[float, int]]] = {}
     for place, condition in enumerate(conditions):
         if isinstance(condition, Threshold):
             of_quantity.setdefault(condition.quantity, []).append((condition.value, place))
     for thresholds in of_quantity.values():
-        # From the highest one down, each with all that are higher.
+        # From the highest one down, each with all higher ones.
         higher = 0
         for value, equal in groupby(sorted(thresholds, reverse=True), key=itemgetter(0)):
             places = [place for _, place in equal]
@@ -68,7 +68,7 @@ def enclosing_literals(conditions: Sequence[Condition]) -> list[int]:
 
 
 def intervals_among(conjunction: Codes, enclosing: Sequence[int]) -> int:
-    """How many intervals `merged` makes of a conjunction in numbers, which is float-reduced.
+    """How many intervals `merged` makes of a float-reduced conjunction of codes.
 
     Args:
         conjunction: At most one lower and one upper threshold of each feature.
@@ -79,7 +79,7 @@ def intervals_among(conjunction: Codes, enclosing: Sequence[int]) -> int:
 
 
 def _interval(one: Literal, other: Literal) -> Interval | None:
-    """What two literals say together, if that is an interval."""
+    """The interval that two literals make; None if they make none."""
     lower, upper = (one, other) if other.positive else (other, one)
     match lower, upper:
         case (

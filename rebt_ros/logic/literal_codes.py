@@ -1,11 +1,11 @@
-"""Rules in numbers: literals are small integers wherever the same ones are compared very often.
+"""Rules in numbers: literals as small integers, for code that compares them very often.
 
 code
-    A literal: twice the position of its condition in a vocabulary, and one more if it is positive.
+    A literal: twice the position of its condition in a vocabulary, plus one if it is positive.
 cover
     A DNF: each conjunction as the codes of its literals, in their order.
 mask
-    A set of literals: an integer in which the bit of each one's code is set.
+    A set of literals: an integer with the bit of each literal's code set.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ Cover: TypeAlias = Sequence[Codes]
 
 
 class Numbering:
-    """The codes of literals, and back."""
+    """A mapping between literals and their codes."""
 
     def __init__(self, conditions: Iterable[Condition]) -> None:
-        """Numbers the conditions in their order; each one once."""
+        """Numbers the conditions in their order, each once."""
         self.conditions = tuple(conditions)
         self._literals = tuple(
             Literal(condition, positive)
@@ -34,11 +34,11 @@ class Numbering:
         self._code = {condition: 2 * position for position, condition in enumerate(self.conditions)}
 
     def codes(self, literals: Iterable[Literal]) -> Codes:
-        """The code of each literal; their conditions must be among those that are numbered."""
+        """The code of each literal, whose condition must be in the vocabulary."""
         return tuple(self._code[literal.condition] + literal.positive for literal in literals)
 
     def cover(self, dnf: Dnf) -> list[Codes]:
-        """The DNF in numbers."""
+        """The cover of a DNF."""
         return [self.codes(conjunction) for conjunction in dnf]
 
     def literals(self, codes: Iterable[int]) -> tuple[Literal, ...]:
@@ -51,7 +51,7 @@ class Numbering:
 
 
 def mask(codes: Iterable[int]) -> int:
-    """The set of some literals."""
+    """The mask of these codes."""
     found = 0
     for code in codes:
         found |= 1 << code

@@ -1,7 +1,7 @@
 """Two-level minimization with Berkeley espresso (Algorithm 1, line 4: LOGIC_MINIMIZER).
 
-The only module that knows pyeda.  Espresso is fed cubes, one small integer per condition, never
-symbolic expressions: those would have to be built, ordered and taken apart again.
+The only module that uses pyeda.  Espresso gets cubes, one small integer per condition, instead of
+symbolic expressions, which would have to be built, ordered and taken apart again.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from pyeda.boolalg.espresso import DTYPE, FTYPE, RTYPE, espresso
 from rebt_ros.logic.dnf import FALSE, Dnf, conditions_of
 from rebt_ros.logic.literal_codes import Codes, Cover, Numbering
 
-#: Positional cube notation: what espresso calls the value of one input.
+#: Positional cube notation: espresso's codes for the value of one input.
 _NEGATIVE, _POSITIVE, _ABSENT = 1, 2, 3
-#: Value of the only output: not in the ON-set, in it, or free to be either.
+#: Value of the only output: off, on, or don't care.
 _OFF, _ON, _DONT_CARE = 0, 1, 2
 
-#: Place of each value of an input in the order in which cubes are read: positive ones come first.
+#: Rank of each value of an input in the order of cubes: positive ones come first.
 _RANK = bytes.maketrans(bytes((_POSITIVE, _NEGATIVE, _ABSENT)), bytes(range(3)))
 
 _Cube: TypeAlias = tuple[int, ...]
@@ -37,14 +37,13 @@ def minimize(dnf: Dnf, dont_care: Dnf = FALSE, off: Dnf | None = None) -> Dnf:
 
     Args:
         dnf: Where the rule must hold.
-        dont_care: Where the result may do either.
-        off: Where it must not hold, if that is known: espresso then need not find out by taking a
-            complement, which can be much larger than the rule.  `dnf`, `dont_care` and `off`
-            cover all assignments between them.
+        dont_care: Where the result may be either.
+        off: Where it must not hold, if known.  This saves espresso a complement, which can be much
+            larger than the rule.  `dnf`, `dont_care` and `off` together cover all assignments.
 
     Returns:
         A DNF equal to `dnf` on every assignment of its conditions outside `dont_care`.  Literals
-        stand in the order in which their conditions first occur, and so do conjunctions.
+        and conjunctions are in the order in which their conditions first occur.
     """
     given = Dnf(dnf.conjunctions + dont_care.conjunctions + (off or FALSE).conjunctions)
     numbering = Numbering(conditions_of(given))
@@ -57,22 +56,22 @@ def minimize(dnf: Dnf, dont_care: Dnf = FALSE, off: Dnf | None = None) -> Dnf:
 
 @dataclass(frozen=True, slots=True)
 class Cubes:
-    """A cover as espresso wants it, made ready once for many minimizations."""
+    """A cover in espresso's form, prepared once for many minimizations."""
 
     conditions: tuple[int, ...]
-    """Positions of those that it tests, in the order in which they occur."""
+    """Positions of the conditions that it tests, in order of occurrence."""
     inputs: tuple[bytes, ...]
-    """Of each conjunction, the value of every condition that there is."""
+    """For each conjunction, the value of every condition of the vocabulary."""
     always: bool
-    """Whether a conjunction is empty, and so holds everywhere."""
+    """Whether a conjunction is empty, and so always holds."""
 
 
 def cubes(cover: Cover, conditions: int) -> Cubes:
-    """Makes a cover ready.
+    """Prepares a cover.
 
     Args:
         cover: The conjunctions.
-        conditions: How many there are in the vocabulary of the codes.
+        conditions: Number of conditions in the vocabulary of the codes.
     """
     absent = bytes([_ABSENT]) * conditions
     inputs = []
@@ -88,7 +87,7 @@ def cubes(cover: Cover, conditions: int) -> Cubes:
 def minimized_cover(
     on: Cubes, dont_care: Sequence[Cubes] = (), off: Sequence[Cubes] | None = None
 ) -> list[Codes]:
-    """`minimize` in numbers; what is free, and what must not hold, may be in several parts."""
+    """`minimize` for covers; `dont_care` and `off` may have several parts."""
     if not on.inputs or on.always:
         # Espresso has no cubes of zero inputs.
         return [()] if on.inputs else []
@@ -106,7 +105,7 @@ def minimized_cover(
     _rewind()
     minimized = espresso(len(vocabulary), 1, cover, kinds)
     negative = [2 * condition for condition in vocabulary]
-    # Cubes that test the first conditions of the vocabulary come first, positive ones before.
+    # Cubes that test the first conditions of the vocabulary come first, positive ones in front.
     return [
         tuple(
             [
@@ -122,9 +121,9 @@ def minimized_cover(
 def _rewind() -> None:
     """Makes espresso forget earlier calls, so that equal rules are minimized equally.
 
-    Its REDUCE step goes through the cubes in one of two orders, by turns, and the library remembers
-    across calls whose turn it is.  Minimizing `_EITHER_WAY` takes one turn, and leaves the rule
-    unchanged only in the turn before the one that a new process begins with.
+    Its REDUCE step alternates between two orders of the cubes, and the library remembers across
+    calls which one is next.  Minimizing `_EITHER_WAY` takes one turn.  It leaves the rule unchanged
+    only if the next turn is the one that a new process begins with.
     """
     for _ in range(2):
         if espresso(3, 1, _EITHER_WAY, FTYPE | DTYPE) == _UNCHANGED:
@@ -136,7 +135,7 @@ def _reading_order(cube: _Cube) -> bytes:
 
 
 def _picking(places: tuple[int, ...]) -> Callable[[bytes], _Cube]:
-    """Takes the values at these places; one or more."""
+    """A function that takes the values at these places; at least one."""
     if len(places) == 1:
         return lambda cube: (cube[places[0]],)
     pick: Callable[[bytes], _Cube] = itemgetter(*places)

@@ -15,7 +15,7 @@ from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.demonstration.together import notes_together
 from rebt_ros.drawing.text import render_text
-from rebt_ros.errors import InputError, OptionError
+from rebt_ros.errors import InputError, OptionError, listing
 from rebt_ros.learning import pipeline
 from rebt_ros.learning.learning_file import write_learning
 from rebt_ros.learning.levels import check_most_levels
@@ -47,9 +47,6 @@ _TOPIC = re.compile(r"/?(?:[A-Za-z_]\w*/)*[A-Za-z_]\w*", re.ASCII)
 
 #: So many different ones can be actions even where each was shown once or twice.
 _FEW_ACTIONS = 20
-
-#: How many names a note lists.
-_LISTED = 8
 
 #: Of all the work, where pruning levels are written.
 _LEARNING_SHARE = 0.3
@@ -242,9 +239,8 @@ def _on_weights(weights: Mapping[str, int]) -> Iterator[str]:
     for name, weight in weights.items():
         by_weight.setdefault(weight, []).append(name)
     for weight, names in sorted(by_weight.items()):
-        more = ", ..." if len(names) > _LISTED else ""
         times = "once" if weight == 1 else f"{weight} times"
-        yield f"each row counts {times} in {', '.join(names[:_LISTED])}{more}"
+        yield f"each row counts {times} in {listing(names)}"
 
 
 def _refuse_what_are_no_actions(table: DemonstrationTable) -> None:

@@ -1,8 +1,8 @@
 """Replacing the cycles of the LAT graph by cycle nodes (Algorithm 2, line 3: REMOVE_CYCLES).
 
 A graph can have more simple cycles than anyone can list, so they are never enumerated.  One cycle
-is replaced at a time: that which the demonstrations closed most often and, where they closed none
-that is left, one that a depth-first search meets.
+is replaced at a time: the one that the demonstrations closed most often or, if they closed none of
+the remaining ones, the first that a depth-first search finds.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ import numpy.typing as npt
 from rebt_ros.paper.lat_nodes import CycleNode, GraphNode, LatGraph
 from rebt_ros.paper.lat_occurrences import Occurrences
 
-#: Deepest nesting of cycles in a cycle node; what is nested deeper helps no reader.
+#: Deepest nesting of cycles in a cycle node; deeper nesting helps no reader.
 DEEPEST_NESTING = 8
-#: Loops of the demonstrations, the most frequent ones, that are candidates of one pass.
+#: How many loops of the demonstrations, the most frequent first, one pass considers.
 MOST_LOOPS = 256
 
-#: Nodes of the graph at hand, by number.
+#: Numbers of nodes of the current graph.
 _Cycle: TypeAlias = tuple[int, ...]
-#: Which nodes a run can be of: several where an action is in several PSA groups.
+#: The nodes that a run may belong to: several if its action is in several PSA groups.
 _Owners: TypeAlias = tuple[int, ...]
 #: Positions of owners, one for each run of a demonstration.
 _Runs: TypeAlias = "npt.NDArray[np.unsignedinteger[Any]]"
@@ -39,9 +39,9 @@ class CycleStart(Enum):
     """Which node of a cycle its Repeater starts with (paper, III-B)."""
 
     MOST_FREQUENT = "most_frequent"
-    """The first of the rotation that occurs most often in the demonstrations."""
+    """The first node of the rotation that occurs most often in the demonstrations."""
     ARBITRARY = "arbitrary"
-    """The first in the order of the rules."""
+    """The first node in the order of the rules."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class ClosedCycle:
 
     cycle: CycleNode
     times: int
-    """How often they came back to one of its nodes by way of the others."""
+    """How often they returned to one of its nodes after passing through the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,25 +59,25 @@ class Acyclic:
 
     graph: LatGraph
     self_loops: int = 0
-    """Edges from a PSA group to itself: choosing once more among its actions is no new step."""
+    """Edges from a PSA group to itself: choosing among its actions again is not a new step."""
     edges: int = 0
     """Edges of cycles that would have been nested deeper than `DEEPEST_NESTING`."""
     closed: tuple[ClosedCycle, ...] = ()
-    """Cycles of the graph as it was, without self-loops: those that the demonstrations closed, the
-    most frequent first (see `MOST_LOOPS`)."""
+    """Cycles of the original graph, without self-loops, that the demonstrations closed; the most
+    frequent first (see `MOST_LOOPS`)."""
 
 
 def remove_cycles(
     graph: LatGraph, occurrences: Occurrences, start: CycleStart = CycleStart.MOST_FREQUENT
 ) -> Acyclic:
-    """REMOVE_CYCLES: collapses one cycle after the other until the graph has none.
+    """REMOVE_CYCLES: collapses one cycle after another until the graph has none.
 
-    A cycle node takes over all edges into and out of its nodes, so that it can be part of later
-    cycles.  Of equally frequent cycles the shortest is collapsed first, of those the first one in
-    the order of the nodes, where cycle nodes come last.
+    A cycle node takes over all edges into and out of its nodes, and can so be part of later cycles.
+    Of equally frequent cycles the shortest is collapsed first; of equally short ones, the first in
+    the order of the nodes, in which cycle nodes come last.
 
     Args:
-        graph: Of action nodes only.
+        graph: A graph of action nodes only.
         occurrences: The demonstrations.
         start: Which node a cycle starts with.
     """
@@ -95,7 +95,7 @@ def _without_cycles(graph: LatGraph, occurrences: Occurrences, start: CycleStart
 
 
 class _Work:
-    """A graph that changes, its nodes numbered in the order in which they came in."""
+    """A changing graph, its nodes numbered in the order in which they were added."""
 
     def __init__(self, graph: LatGraph, occurrences: Occurrences) -> None:
         self._nodes: dict[int, GraphNode] = dict(enumerate(graph.nodes))
@@ -117,7 +117,7 @@ class _Work:
         )
 
     def closed_cycles(self) -> list[tuple[_Cycle, int]]:
-        """Cycles that the demonstrations closed and how often, the most frequent first."""
+        """Cycles that the demonstrations closed, and how often; the most frequent first."""
         if self._closed is None:
             self._closed = self._find_closed()
         return self._closed
@@ -134,7 +134,7 @@ class _Work:
         return _most_frequent(closed)
 
     def next_cycle(self) -> _Cycle | None:
-        """The cycle to collapse now; None where there is none that may still be nested."""
+        """The next cycle to collapse; None if none may be nested any deeper."""
         if nx.is_directed_acyclic_graph(self._engine):
             return None
         if closed := self.closed_cycles():
@@ -149,7 +149,7 @@ class _Work:
         return CycleNode(tuple(self._nodes[number] for number in self._from_start(cycle, start)))
 
     def collapse(self, cycle: _Cycle, start: CycleStart) -> None:
-        """Replaces the nodes of the cycle by a cycle node, to which their edges move."""
+        """Replaces the nodes of the cycle by a cycle node, which takes over their edges."""
         node = self.cycle_node(cycle, start)
         number = max(self._nodes) + 1
         before = [
@@ -168,7 +168,7 @@ class _Work:
         self._closed = None
 
     def drop_back_edges(self) -> int:
-        """Removes what closes cycles in a depth-first search, and tells how many edges that is."""
+        """Removes the edges that close cycles in a depth-first search; returns how many."""
         finished = {
             number: place for place, number in enumerate(nx.dfs_postorder_nodes(self._engine))
         }
@@ -177,7 +177,7 @@ class _Work:
         return len(back)
 
     def result(self) -> LatGraph:
-        """The graph, a cycle node standing where the first of its actions stood."""
+        """The graph, with each cycle node in the place of the first of its actions."""
         numbers = sorted(self._engine, key=self._rank.__getitem__)
         place = {number: place for place, number in enumerate(numbers)}
         edges = sorted((place[before], place[after]) for before, after in self._engine.edges)
@@ -198,8 +198,8 @@ class _Work:
     def _as_cycle(self, loop: tuple[_Owners, ...]) -> _Cycle | None:
         """A cycle of the graph that the loop went through, its smallest number first.
 
-        Where a run can be of several nodes, one way to each of them is enough: of the nodes of a
-        loop, few are ambiguous.
+        If a run may belong to several nodes, one way to each is enough: few nodes of a loop are
+        ambiguous.
         """
         for first in loop[0]:
             ways: list[_Cycle] = [] if first in self._deepest else [(first,)]
@@ -231,16 +231,16 @@ class _Work:
         return min(by_rank, key=self._rarity)
 
     def _rarity(self, rotation: _Cycle) -> tuple[int, int]:
-        """Smallest for the most frequent rotation, of several for the one that was shown first."""
+        """Smallest for the most frequent rotation; of equals, for the one that was shown first."""
         path = [self._nodes[number] for number in rotation]
         return -self._occurrences.count(path), self._occurrences.first(path)
 
 
 class _Steps:
-    """The demonstrations as nodes that follow each other, neighbors differ.
+    """The demonstrations as sequences of nodes; neighbors differ.
 
-    Inside a cycle node nothing new begins.  Which nodes a run can be of is a number, so that loops
-    are cut out of arrays, and counted as bytes.
+    No loop begins inside a cycle node.  The nodes that a run may belong to are encoded as a number,
+    which makes loops slices of arrays that are counted as bytes.
     """
 
     def __init__(self, shown: Iterable[list[_Owners]]) -> None:
@@ -255,7 +255,7 @@ class _Steps:
         ]
 
     def loops(self) -> Counter[tuple[_Owners, ...]]:
-        """Each way back to a run's nodes by way of distinct other ones, and how often it was taken.
+        """Each way back to the nodes of a run through distinct others, and how often it was taken.
 
         The smallest nodes come first.
         """
@@ -272,7 +272,7 @@ class _Steps:
         return loops
 
     def collapse(self, cycle: _Cycle, number: int) -> None:
-        """Replaces the nodes of the cycle by the one with the number."""
+        """Replaces the nodes of the cycle by the node with this number."""
         renamed = [_renamed(owners, cycle, number) for owners in self._owners]
         self._owners = sorted(set(renamed))
         places = _places(self._owners)
@@ -296,9 +296,9 @@ def _renamed(owners: _Owners, cycle: _Cycle, number: int) -> _Owners:
 
 
 def _ways_back(runs: _Runs, nobody: int) -> Iterator[bytes]:
-    """Parts of the runs from one to its next occurrence in which none is twice, as bytes.
+    """Stretches of runs from one to its next occurrence, in which no run repeats, as bytes.
 
-    A run of nobody's breaks off every way.
+    A run that belongs to no node ends every stretch.
     """
     count = len(runs)
     before = np.full(count, -1)
@@ -307,7 +307,7 @@ def _ways_back(runs: _Runs, nobody: int) -> Iterator[bytes]:
     before[order[1:][again]] = order[:-1][again]
     free = runs == nobody
     before[free] = -1
-    # From where on no run is twice before the place at hand.
+    # The place from which on no run repeats before the current place.
     since = np.maximum.accumulate(np.where(free, np.arange(count), before) + 1)
     distinct_since = np.append(0, since[:-1])[:count]
     ends = np.flatnonzero((before >= distinct_since) & ~free)
@@ -317,5 +317,5 @@ def _ways_back(runs: _Runs, nobody: int) -> Iterator[bytes]:
 
 
 def _most_frequent(counted: Counter[tuple[_T, ...]]) -> list[tuple[tuple[_T, ...], int]]:
-    """What was counted, the most frequent first, of equals the shortest."""
+    """Counted items, the most frequent first; of equals, the shortest."""
     return sorted(counted.items(), key=lambda item: (-item[1], len(item[0]), item[0]))

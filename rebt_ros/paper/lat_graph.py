@@ -4,12 +4,12 @@ node
     An action of a rule, or its PSA group of actions (`ActionNode`); once cycles are removed, also
     a cycle of such nodes (`CycleNode`).
 edge
-    From u to v where the rule of v has a conjunction with the literal ``LAT = a`` and a is an
+    From u to v if the rule of v has a conjunction with the literal ``LAT = a``, where a is an
     action of u: it was shown that v follows u.
 
-A PSA group is one node and stands for each of its members.  Where a member is the last action
-taken, the edge comes from every node that has it: from the group and, if the action has a rule of
-its own or is in other groups, from those as well, since LAT does not tell which rule took it.
+A PSA group is one node and stands for each of its members.  If a member is the last action taken,
+there is an edge from every node that has it: from the group, from the action's own rule if it has
+one, and from other groups that contain it, since LAT does not tell which rule took it.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ def generate_graph(rules: Iterable[Rule]) -> LatGraph:
             conjunction.  No two rules trigger the same actions.
 
     Returns:
-        The graph in the order of the rules, self-loops included: a PSA group leads to itself where
-        one of its members was shown after another one.  A LAT action that no rule triggers has no
-        node, so no edge comes from it.
+        The graph in the order of the rules, with self-loops: a PSA group leads to itself if one of
+        its members was shown after another.  A LAT action that no rule triggers has no node, and so
+        no edges.
     """
     rules = [rule for rule in rules if rule.dnf.conjunctions]
     nodes = tuple(ActionNode(rule.actions) for rule in rules)
@@ -55,8 +55,8 @@ def generate_graph(rules: Iterable[Rule]) -> LatGraph:
 def last_action(conjunction: Conjunction, node: ActionNode) -> str | None:
     """The LAT action of a conjunction of the node's rule.
 
-    None where there is no positive LAT literal, and where the conjunction can never hold: LAT is
-    one action at a time, and differs from the action that is being decided.
+    None if there is no positive LAT literal, or if the conjunction can never hold: LAT is one
+    action at a time, and differs from the action being decided.
     """
     named = {
         literal.condition.action

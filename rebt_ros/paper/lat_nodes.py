@@ -26,16 +26,16 @@ class ActionNode:
 
     @property
     def nesting(self) -> int:
-        """How many cycles lie within each other here: none."""
+        """Depth of nested cycles: 0."""
         return 0
 
 
 @dataclass(frozen=True, slots=True)
 class CycleNode:
-    """A cycle that was replaced by one node; it is its own entry of the paper's lookup table."""
+    """A cycle that was replaced by one node: an entry of the paper's lookup table."""
 
     path: tuple[GraphNode, ...]
-    """Its nodes from the start node on, the last of which leads back to the first."""
+    """Its nodes, from the start node on; the last one leads back to the first."""
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -44,7 +44,7 @@ class CycleNode:
 
     @property
     def nesting(self) -> int:
-        """How many cycles lie within each other here, itself included."""
+        """Depth of nested cycles, including this one."""
         return 1 + max(node.nesting for node in self.path)
 
 
@@ -53,7 +53,7 @@ GraphNode: TypeAlias = ActionNode | CycleNode
 
 @dataclass(frozen=True, slots=True)
 class LatGraph:
-    """A directed graph; nodes and edges are ordered, so that all that follows is too."""
+    """A directed graph; the order of nodes and edges makes all results deterministic."""
 
     nodes: tuple[GraphNode, ...]
     edges: tuple[tuple[int, int], ...]

@@ -1,16 +1,15 @@
-"""How often paths of the LAT graph really occurred in the demonstrations.
+"""How often paths of the LAT graph occurred in the demonstrations.
 
-The demonstrations are taken as runs: ``a a b b a`` is ``a b a``, as LAT sees it.  A path occurs
-where its nodes follow each other without gaps inside one demonstration:
+Demonstrations are sequences of runs: ``a a b b a`` is ``a b a``, as LAT sees it.  A path occurs
+where its nodes follow each other without gaps in one demonstration:
 
-- an action, or any member of a PSA group, by one run;
-- a cycle by one or more full passes of its path from its start node on, and possibly a last one
-  that is left between two nodes, as a Repeater is left when a condition fails.
+- an action, or any member of a PSA group, as one run;
+- a cycle as one or more full passes of its path from the start node on.  A last pass may end
+  between two nodes, as a Repeater does when a condition fails.
 
-Only the repetitions of a node are counted in rows, as LAT never shows them.
+Only repetitions of a single node are counted in rows, since LAT never shows them.
 
-Places in the demonstrations are the bits of an integer, so that a path is looked for everywhere at
-once.
+Places in the demonstrations are bits of an integer, so a path is searched for everywhere at once.
 """
 
 from __future__ import annotations
@@ -28,19 +27,19 @@ from rebt_ros.paper.lat_nodes import ActionNode, GraphNode
 
 _Found = TypeVar("_Found")
 
-#: Labels of the actions of each demonstration; neighbors differ, or are rows.
+#: Labels of the actions of each demonstration: runs, whose neighbors differ, or rows.
 Runs: TypeAlias = tuple[tuple[str, ...], ...]
 #: Bit n stands for the place before run n, of all demonstrations one after the other.
 _Places: TypeAlias = int
-#: Where a run of an action node stands, or what a cycle node goes through.
+#: Where runs of an action node are, or what a cycle node goes through.
 _Compiled: TypeAlias = "_Places | tuple[_Compiled, ...]"
 
-#: Places that are looked at for the end of an occurrence before more are.
+#: How many places are searched for the end of an occurrence before more are.
 _PART = 256
 
 
 def runs(table: DemonstrationTable) -> Runs:
-    """The actions of each demonstration of the table, runs of equal ones as one."""
+    """The actions of each demonstration of the table, one per run of equal actions."""
     return tuple(
         tuple(label for label, _ in groupby(demonstration)) for demonstration in rows(table)
     )
@@ -79,21 +78,18 @@ class Occurrences:
         self._found: dict[Hashable, Any] = {}
 
     def remembered(self, key: Hashable, find: Callable[[], _Found]) -> _Found:
-        """What was found in the demonstrations by this key, searched for only once.
-
-        Many pruning levels have the same LAT graph.
-        """
+        """The result for this key, searched for once: many pruning levels share a LAT graph."""
         if key not in self._found:
             self._found[key] = find()
         found: _Found = self._found[key]
         return found
 
     def count(self, path: Sequence[GraphNode]) -> int:
-        """How often the path occurs: the longest occurrences, from left to right, no overlaps."""
+        """How often the path occurs: longest occurrences, from left to right, without overlaps."""
         return self._count_and_first(tuple(path))[0]
 
     def first(self, path: Sequence[GraphNode]) -> int:
-        """The first place at which the path occurs; -1 where it does not."""
+        """The first place at which the path occurs; -1 if it does not."""
         return self._count_and_first(tuple(path))[1]
 
     def repetitions(self, node: ActionNode) -> int:
@@ -128,7 +124,7 @@ def _after(node: _Compiled, starts: _Places, limit: _Places) -> _Places:
     """The places at which occurrences of the node end that begin at one of `starts`.
 
     Raises:
-        _FartherError: One of them, or a part of one, ends behind the places of the limit.
+        _FartherError: One of them, or a part of one, ends beyond the limit.
     """
     if isinstance(node, int):
         ends = (starts & node) << 1
@@ -184,14 +180,14 @@ def _count(path: tuple[_Compiled, ...], starts: _Places) -> int:
 
 
 class _FartherError(Exception):
-    """A walk leaves the part of the demonstrations that is looked at."""
+    """A search leaves the part of the demonstrations that it looks at."""
 
 
 class _LongestWalk:
-    """Finds where the longest occurrence of a path ends that begins at a given place.
+    """Finds the end of the longest occurrence of a path that begins at a given place.
 
-    Occurrences are short and demonstrations are not, so only a part of them is looked at, and a
-    longer one if an occurrence could go on behind it.
+    Occurrences are short and demonstrations are long, so only a part of them is searched, and a
+    longer part if an occurrence may continue beyond it.
     """
 
     def __init__(self, path: tuple[_Compiled, ...]) -> None:
@@ -200,7 +196,7 @@ class _LongestWalk:
         self._part: tuple[_Compiled, ...] = ()
 
     def end(self, start: int) -> int:
-        """The place at which it ends; one must begin at `start`."""
+        """The place at which it ends; an occurrence must begin at `start`."""
         if not self._begin <= start < self._begin + self._length // 2:
             self._look_at(start, _PART)
         while True:
@@ -225,15 +221,15 @@ def _cut(node: _Compiled, begin: int, mask: _Places) -> _Compiled:
 
 def _once_or_more(one_pass: Callable[[_Places], _Places], places: _Places) -> _Places:
     reached = 0
-    # Only from places that are new, so that a long loop is walked once.
+    # Only from new places: a long loop is walked once.
     while places := one_pass(places) & ~reached:
         reached |= places
     return reached
 
 
 def _places_of_labels(shown: Runs) -> tuple[dict[str, _Places], int]:
-    """Where each label stands in all demonstrations, one after the other, and their length."""
-    # No path contains the border, None, so that none crosses it.
+    """Where each label occurs in all demonstrations, one after another, and their length."""
+    # No path contains the border, None, so none crosses it.
     joined = [label for demonstration in shown for label in (*demonstration, None)]
     places: dict[str, list[int]] = {}
     for place, label in enumerate(joined):

@@ -1,7 +1,7 @@
 """The paths of the LAT graph from its sources to its sinks (Algorithm 2, line 4: G.paths).
 
-A graph without cycles can still have more paths than anyone can list, so they are found best first
-and only as many as are asked for.
+A graph without cycles can still have more paths than anyone can list, so only the number asked for
+is searched for, best first.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ class LatPath:
 
 @dataclass(frozen=True, slots=True)
 class LatPaths:
-    """The paths that were asked for."""
+    """The requested paths."""
 
     paths: tuple[LatPath, ...]
-    """The best supported first, of equals the longest."""
+    """The best supported first; of equals, the longest."""
     left_out: int
     """How many more there are."""
 
@@ -75,11 +75,11 @@ def _best_first(engine: nx.DiGraph, graph: LatGraph, occurrences: Occurrences) -
     """All paths in the order of their support.
 
     The beginning of a path occurs at least as often as the whole.  So the number of places at which
-    the beginning ends bounds the support of the paths that go on from it, and the path with the
-    highest bound is always looked at next.  A complete path waits for its turn with its support.
+    it ends bounds the support of all paths that continue it, and the path with the highest bound is
+    extended next.  A complete path waits for its turn with its support.
     """
     # Entries: bound (negative), length (negative, so that among equals the search goes deep), the
-    # path, its ends, and whether the bound is the support.  Paths are distinct, so that entries
+    # path, its ends, and whether the bound is the support.  Paths are distinct, so entries
     # are never compared beyond them.
     waiting: list[tuple[int, int, tuple[int, ...], int, bool]] = []
 

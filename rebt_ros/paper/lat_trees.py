@@ -2,21 +2,21 @@
 
 The subtrees are suggestions (SAES): they overlap with the rules of the main tree.
 
-- A Sequence has memory: it guarantees the last action because it goes on where it was, and the
-  conditions of a step are tested when the step is reached, not again while its action runs.
-- Its first step has the full DNF of its rule, LAT literals included, as it can begin at any time;
-  the steps after it have the conjunctions for the edge on which they are reached, without LAT
-  literals.  The same holds inside a Repeater, whose first step begins the loop anew.
+- A Sequence has memory: it guarantees the last action by continuing where it was.  The conditions
+  of a step are tested when the step is reached, and not again while its action runs.
+- Its first step has the full DNF of its rule, with LAT literals, since it can begin at any time.
+  Each later step has the conjunctions for the edge on which it is reached, without LAT literals.
+  The same holds inside a Repeater, whose first step begins the loop again.
 - After a cycle node, the edge can come from any node of the cycle: the conjunctions for the last
   actions of all its nodes count.
 
 Differences from the printed algorithm:
 
-- What REMOVE_CYCLES returns as a lookup table is in the cycle nodes themselves.
-- The conditions of a step are factored and its Inverters are those of Algorithm 1, as line 29
-  hands the factored rules to this algorithm.  Conjunctions that LAT alone told apart become one.
-- A path that is one cycle node gives its Repeater without a Sequence over it, and an action without
-  edges gives nothing, as its rule is in the main tree.
+- The cycle nodes themselves hold what REMOVE_CYCLES returns as a lookup table.
+- The conditions of a step are factored, and its Inverters are those of Algorithm 1, since line 29
+  passes the factored rules to this algorithm.  Conjunctions that differ only in LAT become one.
+- A path of a single cycle node gives its Repeater without a Sequence over it.  An action without
+  edges gives nothing, since its rule is in the main tree.
 - The number of paths is bounded.
 """
 
@@ -38,7 +38,7 @@ from rebt_ros.paper.lat_paths import source_to_sink_paths
 from rebt_ros.paper.rule_trees import action_tree, condition_trees
 from rebt_ros.paper.rules import Rule
 
-#: LAT trees that are built unless told otherwise.
+#: Number of LAT trees built by default.
 MOST_PATHS = 64
 
 
@@ -54,14 +54,14 @@ class LatTree:
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """What bounds have kept from becoming a tree."""
+    """What did not become a tree because of a bound."""
 
     paths: int = 0
-    """Paths of the graph beyond the number, or below the support, that was asked for."""
+    """Paths of the graph beyond the requested number, or below the requested support."""
     edges: int = 0
     """Edges of cycles that would have been nested too deep (see `lat_cycles`)."""
     self_loops: int = 0
-    """PSA groups of which one member was shown after another one."""
+    """PSA groups with a member that was shown after another one."""
 
     def __bool__(self) -> bool:
         return self != LeftOut()
@@ -72,7 +72,7 @@ class LatTrees:
     """The result of Algorithm 2."""
 
     trees: tuple[LatTree, ...]
-    """The best supported first, of equals the longest path."""
+    """The best supported first; of equals, the longest path."""
     left_out: LeftOut
 
 
@@ -89,13 +89,13 @@ def gen_lat_trees(
 
     Args:
         rules: Minimized and float-reduced, but unfactored.
-        shown: The actions of each demonstration, one per row or per run.  Where several trees are
-            made of the same demonstrations, `Occurrences` saves searching them again.
-        inv_set: Literals to be shown as Inverters (Algorithm 1, line 3).
-        start: Which node a cycle starts with; the linked code of the paper chooses arbitrarily.
-        most_paths: How many trees to build at most.
-        least_support: How often a path must have occurred; 0, as in the paper, also keeps those
-            that the rules allow for but nobody has shown as a whole.
+        shown: The actions of each demonstration, one per row or per run.  Pass `Occurrences` to
+            search the same demonstrations only once for several trees.
+        inv_set: Literals to show as Inverters (Algorithm 1, line 3).
+        start: Which node a cycle starts with; the code linked in the paper chooses arbitrarily.
+        most_paths: Maximum number of trees.
+        least_support: How often a path must have occurred; 0, as in the paper, also keeps paths
+            that the rules allow but nobody has shown as a whole.
     """
     rules = tuple(rules)
     occurrences = shown if isinstance(shown, Occurrences) else Occurrences(shown)
@@ -121,14 +121,14 @@ def gen_lat_trees(
 def repeater(
     cycle: CycleNode, dnfs: Mapping[ActionNode, Dnf], inv_set: frozenset[Literal]
 ) -> nodes.Repeater:
-    """The LAT tree of the cycle's path with a Repeater in the place of its Sequence."""
+    """The LAT tree of the cycle's path, with a Repeater instead of its Sequence."""
     return nodes.Repeater(path_steps(cycle.path, dnfs, inv_set))
 
 
 def path_steps(
     path: Sequence[GraphNode], dnfs: Mapping[ActionNode, Dnf], inv_set: frozenset[Literal]
 ) -> tuple[nodes.Node, ...]:
-    """Lines 6 to 21: what the Sequence of a path runs, step by step."""
+    """Lines 6 to 21: the children of the Sequence of a path, step by step."""
     children: list[nodes.Node] = []
     before: GraphNode | None = None
     for node in path:  # line 6
@@ -147,17 +147,17 @@ def path_steps(
 
 
 def get_lat_conjunct(node: ActionNode, before: GraphNode, rule: Dnf) -> Dnf:
-    """GET_LAT_CONJUNCT: the conjunctions of the node's rule for the edge that comes from `before`.
+    """GET_LAT_CONJUNCT: the conjunctions of the node's rule for the edge from `before`.
 
-    There are several where the action has several rules to follow the same action, and where
-    `before` takes several actions, being a PSA group or a cycle.
+    There are several if several conjunctions follow the same action, or if `before` takes several
+    actions, as a PSA group or a cycle does.
     """
     labels = before.labels
     return Dnf(tuple(one for one in rule if last_action(one, node) in labels))
 
 
 def without_lat_rules(rule: Dnf) -> Dnf:
-    """The rule without its LAT literals, and without conjunctions that have thus become needless.
+    """The rule without its LAT literals, and without conjunctions that became redundant.
 
     >>> after_go, after_turn = Literal(LastActionIs("go")), Literal(LastActionIs("turn"))
     >>> without_lat_rules(Dnf((Conjunction((after_go,)), Conjunction((after_turn,)))))

@@ -1,8 +1,8 @@
-"""RE:BT-Espresso (paper, Algorithm 1) and its baseline BT-Espresso, made of the same steps.
+"""RE:BT-Espresso (paper, Algorithm 1) and its baseline BT-Espresso, built from the same steps.
 
 Differences from the printed algorithm, which change no behavior:
 
-- A Selector or Sequence with a single child is left out: the child stands in its place.
+- A Selector or Sequence with a single child is replaced by the child.
 - LAT trees are returned beside the main tree, not under its root: "an end user is needed to
   manually edit and add the subtrees" (paper, III-B); `learning.suggestions.attach` adds them.
 
@@ -48,8 +48,8 @@ def re_bt_espresso(dt: DecisionTree, shown: Runs = (), *, delta: float = 0.3) ->
 
     Args:
         dt: The decision tree.
-        shown: The actions of each demonstration, by which LAT trees are ranked; the paper has the
-            rules alone.
+        shown: The actions of each demonstration, which rank the LAT trees; the paper has only the
+            rules.
         delta: Threshold of δ-close actions, in [0, 1] (paper: 0.3).
     """
     rules = dt_to_rules_psa(dt, delta)  # line 2

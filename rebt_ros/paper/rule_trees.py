@@ -23,10 +23,10 @@ class FactoredRule:
 
 
 def main_tree(rules: Iterable[Rule], root: Root = Root.PARALLEL) -> nodes.Node:
-    """Lines 3 to 28: the tree of rules that may be those of single actions, under any root.
+    """Lines 3 to 28: the tree of rules, which may be those of single actions, under any root.
 
-    A memoryless Selector root, which the paper allows for, can be executed when actions take longer
-    than a tick: a Parallel fails as soon as one child fails.
+    A memoryless Selector root, which the paper allows, can be executed even if actions take longer
+    than a tick.  A Parallel root cannot: it fails as soon as one child fails.
 
     Args:
         rules: From `dt_to_rules_psa`, or from `dt_to_rules` where PSA nodes are offered as SAES.
@@ -39,7 +39,7 @@ def main_tree(rules: Iterable[Rule], root: Root = Root.PARALLEL) -> nodes.Node:
 
 
 def build_inv_set(rules: Iterable[Rule]) -> frozenset[Literal]:
-    """BUILD_INV_SET: literals to be shown as the inverse of another one."""
+    """BUILD_INV_SET: literals to show as the inverse of another one."""
     return inverses.build_inv_set(rule.dnf for rule in rules)
 
 
@@ -57,7 +57,7 @@ def reduce_floats(rules: Iterable[Rule]) -> tuple[Rule, ...]:
 
 
 def pullout_common(rules: Iterable[Rule]) -> tuple[FactoredRule, ...]:
-    """PULLOUT_COMMON: the rules with the literals that all their conjunctions share in front."""
+    """PULLOUT_COMMON: the rules, with literals that all their conjunctions share in front."""
     return tuple(FactoredRule(rule.actions, factoring.pull_out_common(rule.dnf)) for rule in rules)
 
 
@@ -75,7 +75,7 @@ def with_root(root: Root, children: Sequence[nodes.Node]) -> nodes.Node:
     """Line 7: the rule trees under the root.
 
     Raises:
-        OptionError: A Sequence over several rules, no two of which ever hold in the same state.
+        OptionError: The root is a Sequence over several rules, which never hold in the same state.
     """
     if len(children) == 1:
         return children[0]
@@ -92,7 +92,7 @@ def with_root(root: Root, children: Sequence[nodes.Node]) -> nodes.Node:
 
 
 def condition_trees(condition: Factored, inv_set: frozenset[Literal]) -> list[nodes.Node]:
-    """Lines 14 to 26: what must succeed, one after the other, before the action."""
+    """Lines 14 to 26: what must succeed, one after another, before the action."""
     trees: list[nodes.Node] = [_literal_tree(literal, inv_set) for literal in condition.common]
     if condition.alternatives:
         alternatives = [

@@ -13,10 +13,10 @@ from rebt_ros.logic.dnf import Conjunction, Dnf
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A DNF with the action that it triggers, or the set of δ-close actions (PSA)."""
+    """A DNF with the action, or the set of δ-close actions (PSA), that it triggers."""
 
     actions: tuple[Action, ...]
-    """One action, or those of a PSA group with the best supported first."""
+    """One action, or those of a PSA group, the best supported first."""
     dnf: Dnf
     support: int
     """Training rows in its leaves."""
@@ -37,7 +37,7 @@ def dt_to_rules(tree: DecisionTree) -> tuple[Rule, ...]:
 
 
 def dt_to_rules_psa(tree: DecisionTree, delta: float) -> tuple[Rule, ...]:
-    """RE:BT-Espresso's rules: each leaf triggers all its δ-close actions, as one.
+    """RE:BT-Espresso's rules: each leaf triggers all its δ-close actions together.
 
     Args:
         tree: The decision tree.
@@ -45,8 +45,8 @@ def dt_to_rules_psa(tree: DecisionTree, delta: float) -> tuple[Rule, ...]:
             share are δ-close (paper, III-B).  0 keeps exact ties only.
 
     Returns:
-        Rules that no two leaves share and that together cover every state, the best supported
-        first.  Their LAT conditions are meant from their own actions' side.
+        Rules that together cover every state, each leaf in one of them; the best supported first.
+        Their LAT conditions are relative to their own actions.
     """
     return tuple(map(in_its_own_words, leaf_rules(tree, lambda leaf: delta_close(leaf, delta))))
 
@@ -57,7 +57,7 @@ def delta_close(leaf: Leaf, delta: float) -> tuple[int, ...]:
     >>> delta_close(Leaf((7, 10, 0)), 0.3)
     (0, 1)
     """
-    # The tolerance forgives the rounding of 1 - delta, not of the counts, which are whole.
+    # The tolerance is for the rounding of 1 - delta; counts are whole numbers.
     least = (1 - delta) * max(leaf.distribution) - 1e-9
     return tuple(
         action for action, rows in enumerate(leaf.distribution) if rows > 0 and rows >= least
@@ -69,7 +69,7 @@ def leaf_rules(
 ) -> tuple[Rule, ...]:
     """The rules of a decision tree whose leaves trigger what `triggered` says.
 
-    LAT is the decision tree's column still, one variable for all rules.
+    LAT is still the decision tree's column, one variable for all rules.
     """
     leaves: dict[tuple[int, ...], list[tuple[Conjunction, Leaf]]] = {}
     for conjunction, leaf in tree.paths():
@@ -82,8 +82,8 @@ def _rule(
     tree: DecisionTree, group: tuple[int, ...], paths: list[tuple[Conjunction, Leaf]]
 ) -> Rule:
     support = [sum(leaf.distribution[one] for _, leaf in paths) for one in group]
-    # sorted() is stable, so that of equally supported actions the one that the decision tree
-    # itself would choose comes first.
+    # sorted() is stable: of equally supported actions, the one that the decision tree itself
+    # would choose comes first.
     ranked = sorted(zip(support, group, strict=True), key=lambda pair: -pair[0])
     actions = tuple(tree.actions[one] for _, one in ranked)
     rows = sum(sum(leaf.distribution) for _, leaf in paths)
@@ -91,7 +91,7 @@ def _rule(
 
 
 def in_its_own_words(rule: Rule) -> Rule:
-    """The rule with LAT meant from its own side: the last action that is none of its own."""
+    """The rule with LAT relative to its own actions: the last action that is none of them."""
     return Rule(
         rule.actions,
         Dnf(

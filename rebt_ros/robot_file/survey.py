@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from rebt_ros.errors import MessagePathError
+from rebt_ros.errors import MessagePathError, listing
 from rebt_ros.message_path.checking import check
 from rebt_ros.message_path.compiling import Getter, getter
 from rebt_ros.message_path.definition import Definitions, Field, MessageType, Primitive
@@ -64,8 +64,7 @@ class FieldSurvey:
         if not self.seen:
             return "no value"
         if self.kind is Primitive.TEXT:
-            texts = [repr(value) for value in self.values[:4]]
-            return ", ".join(texts) + (", …" if len(self.values) > len(texts) else "")
+            return listing([*map(repr, self.values)], most=4)
         if self.names:
             numbers = [int(value) for value in self.values if not isinstance(value, str)]
             return ", ".join(self.names.get(number, str(number)) for number in numbers[:4])

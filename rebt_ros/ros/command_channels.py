@@ -18,7 +18,7 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.errors import DocumentError
 from rebt_ros.live.action_results import ActionResults
 from rebt_ros.ros.executor.robot_commands import RobotCommands
-from rebt_ros.ros.quiet_events import QUIET_PUBLISHER, QUIET_SUBSCRIPTION
+from rebt_ros.ros.quiet_events import create_publisher, create_subscription
 
 #: Of the topic on which the executor says whether it drives; who comes later hears the latest.
 DRIVING_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -192,15 +192,9 @@ class _Channel:
         self.sent: str | None = None
         self._node = node
         self._not_understood = not_understood
-        self.publisher = node.create_publisher(
-            String, commands, 10, event_callbacks=QUIET_PUBLISHER
-        )
+        self.publisher = create_publisher(node, String, commands, 10)
         self.subscription = (
-            node.create_subscription(
-                String, results, self._on_result, 10, event_callbacks=QUIET_SUBSCRIPTION
-            )
-            if results
-            else None
+            create_subscription(node, String, results, self._on_result, 10) if results else None
         )
 
     def send(self, label: str, every_tick: bool) -> bool:

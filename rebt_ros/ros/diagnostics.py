@@ -16,7 +16,7 @@ from rclpy.clock_type import ClockType
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
-from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
+from rebt_ros.ros.quiet_events import create_publisher
 
 #: How long a fault counts as recent, and stays quiet after it was logged (seconds).
 _RECENT = 5.0
@@ -61,9 +61,7 @@ class Diagnostics:
         self._source = node.get_fully_qualified_name().lstrip("/")
         self._task = task
         self._report = report
-        self._publisher = node.create_publisher(
-            DiagnosticArray, "/diagnostics", 10, event_callbacks=QUIET_PUBLISHER
-        )
+        self._publisher = create_publisher(node, DiagnosticArray, "/diagnostics", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(1.0, self.publish, callback_group=group, clock=steady)
 

@@ -17,7 +17,7 @@ from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.ros.graph_watch import Finding
 from rebt_ros.ros.message_types import installed, message_class
 from rebt_ros.ros.parameters import Parameters, at_home
-from rebt_ros.ros.quiet_events import QUIET_SUBSCRIPTION
+from rebt_ros.ros.quiet_events import create_subscription
 from rebt_ros.verification.robot_rules import rules_of
 
 
@@ -153,13 +153,8 @@ class RobotTopics:
     def _subscribe(self, topic: str, qos: QoSProfile) -> None:
         bound = self.bound[topic]
         kind: type[Any] = message_class(bound.kind)
-        self.subscriptions[topic] = self._node.create_subscription(
-            kind,
-            topic,
-            self._callback(bound),
-            qos,
-            callback_group=self._group,
-            event_callbacks=QUIET_SUBSCRIPTION,
+        self.subscriptions[topic] = create_subscription(
+            self._node, kind, topic, self._callback(bound), qos, self._group
         )
 
     def _full(self, topic: str) -> str:

@@ -9,13 +9,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
-from rebt_ros.errors import InputError
+from rebt_ros.errors import InputError, listing
 from rebt_ros.storage.sources import listed
 
 #: How an address begins that is a list of addresses.
 _LIST: Final = "@"
-#: How many names a message lists.
-_LISTED: Final = 8
 
 
 class Demonstrations:
@@ -43,11 +41,10 @@ class Demonstrations:
         """
         found = tuple(self._found(address))
         if not found:
-            there = ", ".join(self._names[:_LISTED]) or "none"
-            more = ", ..." if len(self._names) > _LISTED else ""
+            there = listing(self._names) or "none"
             raise InputError(
                 f"no demonstration is called {address!r}, and no file of one: there are "
-                f"{there}{more} (inspect lists all)."
+                f"{there} (inspect lists all)."
             )
         return found
 

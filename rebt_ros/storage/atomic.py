@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
+from collections.abc import Callable
 from pathlib import Path
 
 from rebt_ros.errors import RebtError
@@ -33,28 +34,44 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
     Raises:
         StorageError: It could not be written; what was there before is untouched.
     """
-    temporary: Path | None = None
-    try:
-        target = path.resolve()
-        target.parent.mkdir(parents=True, exist_ok=True)
-        # In the same directory, because a file cannot be renamed across file systems.
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}")
+
+    def write(temporary: Path) -> None:
         with temporary.open("xb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(target)
+
+    try:
+        target = path.resolve()
+        target.parent.mkdir(parents=True, exist_ok=True)
+        replace_with(target, write)
         sync_directory(target.parent)
     except OSError as err:
         raise StorageError(
             f"{path} cannot be written ({err.strerror or err}): "
             "name a place with room where you may write."
         ) from err
+
+
+def replace_with(path: Path, write: Callable[[Path], object]) -> None:
+    """Creates or replaces a file with one that is written under a temporary name beside it.
+
+    Args:
+        path: File to create or replace; its directory exists.
+        write: Writes the new file to the path that it is given.
+
+    Raises:
+        OSError: It could not be written; what was there before is untouched.
+    """
+    # In the same directory, because a file cannot be renamed across file systems.
+    temporary = path.with_name(f".{path.name[:16]}.{os.getpid()}.{secrets.token_hex(4)}")
+    try:
+        write(temporary)
+        temporary.replace(path)
     finally:
-        # After success the temporary name is gone already.
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
+        # After success, the temporary name is gone.
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def sync_directory(directory: Path) -> None:

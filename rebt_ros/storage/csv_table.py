@@ -22,7 +22,7 @@ from rebt_ros.demonstration.demonstration import (
     in_sorted_order,
 )
 from rebt_ros.demonstration.schema import Feature
-from rebt_ros.errors import InputError
+from rebt_ros.errors import InputError, listing
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.cells import (
     Column,
@@ -56,9 +56,6 @@ OUTCOME_SUFFIX = ".outcome"
 
 #: Where there are more actions than that, they should recur.
 _MANY_ACTIONS = 20
-
-#: How many column names a message lists.
-_LISTED = 8
 
 
 def read_csv(
@@ -513,8 +510,7 @@ def _check_names(path: Path, columns: Sequence[str]) -> None:
 
 
 def _listing(columns: Sequence[str]) -> str:
-    more = ", ..." if len(columns) > _LISTED else ""
-    return f"the columns are {', '.join(columns[:_LISTED])}{more}"
+    return f"the columns are {listing(columns)}"
 
 
 def _refuse_header(table: _Table) -> None:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from rebt_ros.demonstration.demonstration import Demonstration
-from rebt_ros.errors import InputError, OptionError, RebtError
+from rebt_ros.errors import InputError, OptionError, RebtError, listing
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.account import Account
 from rebt_ros.storage.addressing import weighted
@@ -22,9 +22,6 @@ from rebt_ros.storage.recording import read_recording
 from rebt_ros.storage.recording_files import SUFFIX, is_recording
 from rebt_ros.storage.robot_bag import read_robot_bag
 from rebt_ros.storage.sources import Strange, names_of, passed_over, sources_of
-
-#: How many paths a note lists.
-_LISTED = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,9 +185,8 @@ def _aside(
 
 def _notes_on_excluded(paths: Sequence[Path], inputs: int) -> Iterator[str]:
     if paths:
-        more = ", ..." if len(paths) > _LISTED else ""
-        named = ", ".join(map(str, paths[:_LISTED]))
-        yield f"{len(paths)} of {inputs} demonstrations are left out as asked: {named}{more}"
+        count = f"{len(paths)} of {inputs}"
+        yield f"{count} demonstrations are left out as asked: {listing(paths)}"
 
 
 def _notes_on_cache(gathered: Gathered, options: InputOptions) -> Iterator[str]:

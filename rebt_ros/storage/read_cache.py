@@ -7,16 +7,16 @@ import hashlib
 import json
 import os
 import re
-import secrets
 import stat
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Final
 
 from rebt_ros.robot_file.robot_file import RobotFile
+from rebt_ros.storage.atomic import replace_with
 from rebt_ros.storage.column_file import NoColumnFileError, packed, read_columns
 from rebt_ros.storage.input_options import InputKind, Source
 from rebt_ros.storage.read import Read
@@ -163,7 +163,7 @@ class ReadCache:
             with temporary.open("wb") as file:
                 file.writelines(content)
 
-        _replace(path, write)
+        replace_with(path, write)
 
     def key_of(self, source: Source, deciding: tuple[object, ...]) -> str:
         """The key of an input, as `key_of` gives it, without reading one that is as it was.
@@ -191,26 +191,11 @@ class ReadCache:
         if time.time_ns() - latest > _SETTLED and state_of(source) == state:
             with contextlib.suppress(OSError):
                 link.parent.mkdir(parents=True, exist_ok=True)
-                _replace(link, lambda temporary: temporary.symlink_to(key))
+                replace_with(link, lambda temporary: temporary.symlink_to(key))
         return key
 
     def _path(self, key: str) -> Path:
         return self.directory / key[:2] / f"{key[2:]}{SUFFIX}"
-
-
-def _replace(path: Path, write: Callable[[Path], object]) -> None:
-    """Lets something be written beside a path and puts it there at once.
-
-    Raises:
-        OSError: That does not work.
-    """
-    temporary = path.with_name(f".{path.name[:16]}.{os.getpid()}.{secrets.token_hex(4)}")
-    try:
-        write(temporary)
-        temporary.replace(path)
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def kept_bytes(source: Source, read: Read) -> Iterator[bytes]:

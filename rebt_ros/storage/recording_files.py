@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from rebt_ros.errors import InputError
+from rebt_ros.errors import InputError, listing
 from rebt_ros.storage.text import unreadable
 
 SUFFIX: Final = ".rec"
@@ -15,9 +15,6 @@ MARK: Final = b"# rebt_ros recording "
 
 #: Longer first lines are refused, so that a file that is no recording is not read as a whole.
 LONGEST_LINE: Final = 1 << 24
-
-#: How many names a message lists.
-_LISTED: Final = 8
 
 
 def recordings(directory: Path) -> tuple[Path, ...]:
@@ -46,8 +43,8 @@ def no_recordings(directory: Path) -> tuple[str, ...]:
         return ()
     if len(others) == 1:
         return (f"{others[0]} does not begin like a recording and is left out",)
-    listed = ", ".join(others[:_LISTED]) + (", ..." if len(others) > _LISTED else "")
-    return (f"{len(others)} files do not begin like recordings and are left out: {listed}",)
+    count = len(others)
+    return (f"{count} files do not begin like recordings and are left out: {listing(others)}",)
 
 
 def is_named_so(path: Path) -> bool:

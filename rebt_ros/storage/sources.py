@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from rebt_ros.errors import InputError, printable
+from rebt_ros.errors import InputError, listing, printable
 from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
 from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.input_options import InputKind, Source
@@ -28,9 +28,6 @@ _UNREAD = (
     *(f"{suffix}{packed}" for suffix in (".csv", ".tsv") for packed in (".gz", ".bz2", ".xz")),
     *(".bag", ".xlsx", ".xls", ".ods", ".parquet", ".feather", ".zip"),
 )
-
-#: How many names a message lists.
-_MOST_NAMES = 8
 
 #: How an input begins that is a list of inputs.
 _LIST: Final = "@"
@@ -135,8 +132,7 @@ def _may_be_demonstration(path: Path) -> bool:
 
 
 def _names(paths: Sequence[Path]) -> str:
-    more = ", ..." if len(paths) > _MOST_NAMES else ""
-    return ", ".join(path.name for path in paths[:_MOST_NAMES]) + more
+    return listing([path.name for path in paths])
 
 
 def has_table_suffix(file: Path) -> bool:

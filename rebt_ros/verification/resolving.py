@@ -11,6 +11,7 @@ from typing import Final, NoReturn
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.demonstration.schema import TRUTH, Feature, FeatureKind, number_of
+from rebt_ros.errors import listing
 from rebt_ros.logic.conditions import (
     KNOWN,
     HasCategory,
@@ -44,9 +45,6 @@ from rebt_ros.verification.expressions import (
 )
 from rebt_ros.verification.formulas import AllOf, AnyOf, Formula, negated
 from rebt_ros.verification.rules import EVERYWHERE, Demand, Rule, RuleSet
-
-#: How many names a message lists.
-_LISTED: Final = 8
 
 _MIRRORED: Final = {
     Sign.BELOW: Sign.ABOVE,
@@ -83,7 +81,7 @@ class _Resolver:
         if not found:
             labels = [*dict.fromkeys(action.label for action in self.learned.actions)]
             self._refuse_rule(
-                f"there is no action {_unknown(label, labels)}: there are {_listed(labels)}"
+                f"there is no action {_unknown(label, labels)}: there are {listing(labels)}"
             )
         on_channel = [one for one in found if channel in (None, one.channel)]
         if not on_channel:
@@ -177,7 +175,7 @@ class _Resolver:
                 wanted,
             )
         if wanted not in feature.categories:
-            listed = _listed(feature.categories)
+            listed = listing(feature.categories)
             self._refuse(
                 f"{feature.name!r} has no category {_unknown(right.text, feature.categories)}: "
                 f"it has {listed}",
@@ -243,13 +241,13 @@ class _Resolver:
                 return feature
         names = [one.name for one in self.learned.features]
         unknown = _unknown(word.text, names)
-        self._refuse(f"there is no feature {unknown}: there are {_listed(names)}", word.at)
+        self._refuse(f"there is no feature {unknown}: there are {listing(names)}", word.at)
 
     def _label(self, word: Word) -> str:
         labels = tuple(dict.fromkeys(action.label for action in self.learned.actions))
         if word.text not in labels:
             unknown = _unknown(word.text, labels)
-            self._refuse(f"there is no action {unknown}: there are {_listed(labels)}", word.at)
+            self._refuse(f"there is no action {unknown}: there are {listing(labels)}", word.at)
         return word.text
 
     def _refuse(self, why: str, at: int) -> NoReturn:
@@ -304,8 +302,3 @@ def _unknown(name: str, known: Sequence[str]) -> str:
     """A name that is not known, with the one that may be meant."""
     close = get_close_matches(name, known, n=1)
     return f"{name!r} ({close[0]!r} is like it)" if close else repr(name)
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = ", …" if len(names) > _LISTED else ""
-    return ", ".join(names[:_LISTED]) + more

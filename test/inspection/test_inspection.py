@@ -348,7 +348,7 @@ def test_features_that_never_vary_are_named_here_and_everywhere() -> None:
     assert of(found, "second").missing == 20
     told = list(findings(found))
     assert told[0] == "never vary in any demonstration: x1, x2"
-    assert "second: never vary here, though elsewhere: x0" in told
+    assert "second: never varies here, but does elsewhere: x0" in told
 
 
 def test_large_offsets_and_missing_values_do_not_hide_differences() -> None:

@@ -292,12 +292,12 @@ def test_a_policy_is_public_and_made_from_a_tree_or_its_file(tmp_path: Path) -> 
     [
         (
             {"distance": 1.0, "speed": 2.0},
-            "the state has 'speed', which is no feature of the tree: "
+            "the state has 'speed', which is not a feature of the tree: "
             "it has distance, battery, docked, kind.",
         ),
         (
             {"distance[t-1]": 1.0},
-            "the state has 'distance[t-1]', which is no feature of the tree: "
+            "the state has 'distance[t-1]', which is not a feature of the tree: "
             "it has distance, battery, docked, kind.",
         ),
         (
@@ -350,5 +350,5 @@ def test_features_of_a_lag_are_read_from_the_steps_before() -> None:
 
 
 def test_features_that_all_look_back_have_nothing_to_look_back_at() -> None:
-    with pytest.raises(InputError, match="no feature of the present row beside 'x\\[t-1\\]'"):
+    with pytest.raises(InputError, match="no feature of the current row besides 'x\\[t-1\\]'"):
         Encoding([Feature("x[t-1]", index=0, lag=1)])

@@ -232,7 +232,7 @@ def test_a_delay_is_told_in_seconds(gap: int, late: int) -> None:
     assert found.seconds == pytest.approx(late * gap / 1e9)
     assert found.sentence == (
         f"the demonstrator acted {late * gap / 1e9:.2f} s ({late} rows) late; "
-        "actions are learned as of when they were due"
+        "actions are learned from when they were due"
     )
 
 
@@ -305,7 +305,7 @@ def test_little_is_shown_and_nothing_is_found(table: DemonstrationTable) -> None
 @pytest.mark.parametrize(
     ("table", "why"),
     [
-        (joined(([[1.0, 0.0]], [LEFT])), "one action is taken all the time"),
+        (joined(([[1.0, 0.0]], [LEFT])), "the action is always the same"),
         (joined(*[([[1.0, 0.0], [2.0, 0.0]], [LEFT, RIGHT])] * 9), "demonstrations are too short"),
         (paced(balancings(3), 5 * TENTH), "rows are too far apart"),
         (
@@ -492,7 +492,7 @@ def test_where_nothing_could_be_simpler_nothing_else_is_tried(fits: list[int]) -
     assert estimate(table) == ReactionTime(
         0,
         None,
-        "no reaction time shows: actions are learned as of when they were taken",
+        "no reaction time is found: actions are learned from when they were taken",
         (Trial(0, 3),),
     )
     assert len(fits) == 2

@@ -120,7 +120,7 @@ def test_an_unknown_id_is_refused_with_those_that_there_are() -> None:
             refused(MAIN, OFFERED, ["lat-sequence-1", "lat-sequence-9"])
         assert str(refusal.value) == (
             "there is no suggestion 'lat-sequence-9' to attach: "
-            "choose of lat-sequence-1, lat-sequence-2, lat-sequence-3, or all."
+            "choose one of lat-sequence-1, lat-sequence-2, lat-sequence-3, or all."
         )
     with pytest.raises(OptionError, match="nothing was suggested"):
         attach(MAIN, [], ["psa-1"])

@@ -46,10 +46,11 @@ USES: Final[Sequence[Callable[[Joy], bool]]] = (
 EPISODES: Final = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def _arguments(name: str) -> list[str]:
-    """The arguments of a command, or of a node, of this package."""
-    [arguments] = [its[4:] for its in COMMANDS if its[:4] == ["ros2", "run", "rebt_ros", name]]
-    return arguments
+def _arguments(name: str, *, again: bool = False) -> list[str]:
+    """The arguments of a command, or of a node, of this package, the first or second time."""
+    found = [its[4:] for its in COMMANDS if its[:4] == ["ros2", "run", "rebt_ros", name]]
+    assert len(found) == 1 + (name == "learn")
+    return found[again]
 
 
 def _node(name: str, domain: int, directory: Path) -> NodeProcess:
@@ -57,8 +58,9 @@ def _node(name: str, domain: int, directory: Path) -> NodeProcess:
     return NodeProcess(f"{name}_node", domain, directory, {}, arguments)
 
 
-def _run(name: str, directory: Path) -> str:
-    done = warm_processes.run(f"rebt_ros.commands.{name}", *_arguments(name), directory=directory)
+def _run(name: str, directory: Path, *, again: bool = False) -> str:
+    arguments = _arguments(name, again=again)
+    done = warm_processes.run(f"rebt_ros.commands.{name}", *arguments, directory=directory)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -132,7 +134,15 @@ def test_someone_who_follows_the_page_has_a_tree_that_drives(
             )
             assert peer.call("executor/enable", False).success
             assert executor.stop() == 0
-    assert any(one["reached"] for one in _ended(episodes)[shown:])
+        assert any(one["reached"] for one in _ended(episodes)[shown:])
+
+        corrected = len(episodes)
+        with _node("recorder", domain, tmp_path), _node("demonstrator", domain, tmp_path):
+            peer.wait_until(lambda: len(episodes) > corrected, EPISODE, "a demonstration")
+    assert list((tmp_path / "demonstrations").glob("*.rec"))
+    # The bag is one demonstration.
+    said = _run("learn", tmp_path, again=True)
+    assert " demonstrations; " in said
 
 
 def test_the_robot_file_of_the_page_is_that_of_the_demo() -> None:

@@ -184,7 +184,7 @@ def test_an_unknown_label_column_is_refused_with_the_columns_there_are(table):
 
 def test_only_the_first_columns_are_listed(table):
     header = ",".join(f"c{index}" for index in range(20))
-    with pytest.raises(InputError, match=r"c0, c1, c2, c3, c4, c5, c6, c7, \.\.\.\.$"):
+    with pytest.raises(InputError, match=r"c0, c1, c2, c3, c4, c5, c6, c7, …\.$"):
         read_csv(table(header + "\n" + ",".join("1" * 20) + "\n"), labels=["nope"])
 
 

@@ -1,1 +1,1 @@
-"""Routines: Sequences and Repeaters of guarded steps, found in rows that share one state."""
+"""Routines: Sequences and Repeaters of guarded steps, found in rows that share a state."""

@@ -1,4 +1,4 @@
-"""The words of moments as a tree of their beginnings, to be read all at once."""
+"""The words of moments as a tree of their prefixes, which are read all at once."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ import numpy as np
 from rebt_ros.arrays import Float32Array, FloatArray, IntArray
 from rebt_ros.beyond_the_paper.routines.moments import Moments, Word
 
-#: Different words that are read, those with the most rows.
+#: Number of different words that are read: those with the most rows.
 _MOST_WORDS = 120
-#: Actions of a word that are read.
+#: Number of actions of a word that are read.
 LONGEST_WORD = 9
-#: Share of an action's rows at least, so that noise of rare ones is not improbable beyond measure.
+#: Minimum share of an action's rows, which keeps noise by rare actions from being too improbable.
 _LEAST_SHARE = 0.001
 
 
 class TrieLevel(NamedTuple):
-    """The beginnings of words that have one length."""
+    """The prefixes of one length."""
 
     parent: IntArray
-    """Position on the level before of the beginning without its last action, shape (n,)."""
+    """Position of the prefix without its last action on the level before, shape (n,)."""
     action: IntArray
     """The last action, shape (n,)."""
     ended: FloatArray
     """Moments whose word ends there, shape (n,)."""
     cut: FloatArray
-    """Moments whose word goes on, but is read no further, shape (n,)."""
+    """Moments whose word continues, but is read no further, shape (n,)."""
     noise: Float32Array
-    """Share of the last action, by which noise is it, shape (n,)."""
+    """Share of the last action, its probability as noise, shape (n,)."""
     children: Float32Array
-    """Which of them each beginning of the level before begins, 0 or 1, shape (n before, n)."""
+    """Which of them extend each prefix of the level before, 0 or 1, shape (n before, n)."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,15 +42,15 @@ class Corpus:
     actions: int
     levels: tuple[TrieLevel, ...]
     moments: float
-    """How many moments have these words."""
+    """Number of moments with these words."""
     rows: float
-    """How many actions of them are read."""
+    """Number of their actions that are read."""
     followers: FloatArray
-    """How often an action follows another one, shape (actions, actions)."""
+    """How often an action follows another, shape (actions, actions)."""
     share: FloatArray
     """Share of each action, shape (actions,)."""
     continues: float
-    """Share of actions that are followed by another one in the same moment."""
+    """Share of actions that another one follows in the same moment."""
 
 
 def corpus(moments: Moments) -> Corpus:

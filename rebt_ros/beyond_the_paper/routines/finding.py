@@ -1,4 +1,4 @@
-"""Finds routines in a demonstration table and makes subtrees of them."""
+"""Finds routines in a demonstration table, and makes subtrees of them."""
 
 from __future__ import annotations
 
@@ -20,37 +20,37 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import Literal, Threshold
 
-#: Share of the rows that must follow another one in the same moment for routines to be looked for,
-#: and how many such rows there must be.
+#: Minimum share and number of rows that follow another row in the same moment, for a search for
+#: routines.
 _LEAST_TOGETHER = 0.05
 _FEWEST_TOGETHER = 100
 #: Rounds of expectation maximization before guards are learned.
 _THOROUGH = 10
-#: Programs of which routines are offered, the best ones.
+#: Number of best programs whose routines are offered.
 _MOST_PROGRAMS = 3
-#: Events that tell what another round depends on.
+#: Minimum number of events for learning what another round depends on.
 _FEWEST_ROUNDS = 100
-#: How often a step must follow in the same moment; its guard may contradict the one before, and
-#: then it never does.
+#: How often a step must follow in the same moment; it never does if its guard contradicts the one
+#: before.
 _FEWEST_PASSED = 30
-#: How much rarer going on must be where a guard does not hold: within a stream, and at its
-#: beginning, which may also have been waited for while the state changed.
+#: How much rarer continuing must be if a guard does not hold: within a stream, and at its
+#: beginning, which may also have waited while the state changed.
 _CONTRAST, _CONTRAST_AT_BEGINNING = 0.6, 0.72
 
 
 def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:
-    """Routines of the program that explains best what was done in each state.
+    """Routines of the program that best explains what was done in each state.
 
-    There is something to find only where several actions were done in one state: what is done in
-    one state has one reason, so that its order shows what belongs together, and its presence on
-    what it depends.
+    There is something to find only if several actions were done in one state.  Actions in one state
+    have one reason, so their order shows what belongs together, and their presence shows what it
+    depends on.
 
     Args:
-        table: The rows that were learned from.
+        table: The rows to learn from.
 
     Returns:
-        Each once, whatever its thresholds: routines of the best program, those that explain the
-        most rows first; then its Sequences cut in two, before a step with a guard first; then the
+        Each routine once, whatever its thresholds: those of the best program, by the rows they
+        explain; then its Sequences cut in two, those cut before a guarded step first; then the
         routines of the next programs.
     """
     shown = moments(table)
@@ -78,40 +78,40 @@ def find_routines(table: DemonstrationTable) -> tuple[FoundRoutine, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _ReadStep:
-    """A step as it is offered."""
+    """An offered step."""
 
     guard: tuple[nodes.Node, ...]
     action: nodes.Node
     support: int
-    """How often the rarest of its actions was done in it."""
+    """How often its rarest action was done in it."""
     rows: int
 
 
 @dataclass(frozen=True, slots=True)
 class _ReadRoutine:
-    """A routine as it is offered."""
+    """An offered routine."""
 
     steps: tuple[_ReadStep, ...]
     repeated: bool
 
     @property
     def rows(self) -> int:
-        """How many rows it explains."""
+        """Number of rows that it explains."""
         return sum(step.rows for step in self.steps)
 
     @property
     def whole(self) -> FoundRoutine:
-        """All of it."""
+        """The whole routine."""
         return _found(self.steps, nodes.Repeater if self.repeated else _sequence)
 
     def parts(self, *, guarded: bool) -> Iterator[FoundRoutine]:
-        """What comes before a step, and what begins with it.
+        """The two parts, before a step and from it on.
 
-        Sequences of which one always follows the other do the same as one Sequence, so that it
-        cannot be told where one ends.
+        Two Sequences of which one always follows the other do the same as one Sequence, so the end
+        of the first cannot be observed.
 
         Args:
-            guarded: Whether the step has a guard.
+            guarded: Whether the step must have a guard.
         """
         if self.repeated:
             return
@@ -131,7 +131,7 @@ def _found(
 
 
 def _gist(node: nodes.Node) -> object:
-    """What is the same in routines that differ in thresholds and the order of conditions alone."""
+    """A key that is equal for routines that differ only in thresholds or order of conditions."""
     match node:
         case nodes.Condition(literal=Literal(Threshold(quantity=name), positive)):
             return name, positive
@@ -151,13 +151,13 @@ def _gist(node: nodes.Node) -> object:
             return node
 
 
-#: Where a stream begins.
+#: The beginning of a stream.
 _START = Place(0, 0)
 
 
 @dataclass(frozen=True, slots=True)
 class _Border:
-    """Between two steps of a stream."""
+    """A border between two steps of a stream."""
 
     stream: int
     before: Place
@@ -166,19 +166,19 @@ class _Border:
 
 @dataclass(slots=True)
 class _Events:
-    """Moments in which a routine might have gone on, and whether it did."""
+    """Moments in which a routine might have continued, and whether it did."""
 
     moments: list[int] = field(default_factory=list)
     went_on: list[bool] = field(default_factory=list)
 
     def add(self, where: list[int], went_on: bool) -> None:
-        """As many events as moments."""
+        """An event for each moment."""
         self.moments += where
         self.went_on += [went_on] * len(where)
 
 
 class _Reading:
-    """What each row of the moments was, as a program has it."""
+    """What each row of the moments was, in terms of a program."""
 
     def __init__(self, model: Model, shown: Moments, features: tuple[Feature, ...]) -> None:
         self._model = model
@@ -186,11 +186,11 @@ class _Reading:
         self._shown = shown
         self._features = features
         self._borders: dict[_Border, _Events] = {}
-        #: Events after all rounds of a routine.  Where fewer were seen, it may not have been the
-        #: last one, the more likely the earlier the moment began, which hangs on the state.
+        #: Events after all rounds of a routine.  If fewer were seen, the last one may not have been
+        #: the end; this is more likely the earlier the moment began, which depends on the state.
         self._after_all: dict[_Border, _Events] = {}
         self._begun: dict[tuple[int, Place], set[int]] = {}
-        #: Rows that are a member of the step at a place of a stream.
+        #: Rows that are members of the step at a place of a stream.
         self._rows: dict[tuple[int, Place, int], int] = {}
         of_word: list[list[int]] = [[] for _ in shown.words]
         for moment, word in enumerate(shown.word.tolist()):
@@ -200,7 +200,7 @@ class _Reading:
             self._note(model.explain(word[:LONGEST_WORD], cut), where, cut)
 
     def _note(self, explained: list[int | None], where: list[int], cut: bool) -> None:
-        """Takes down what the rows of a word are, in all moments that have it."""
+        """Records what the rows of a word are, in all moments with this word."""
         states = [self._model.states[one] for one in explained if one is not None]
         rounds = 0
         for before, after in zip([None, *states], [*states, None], strict=True):
@@ -235,11 +235,11 @@ class _Reading:
         return place.step + 1 == len(self._program[stream][place.routine].steps)
 
     def _followers(self, stream: int, place: Place, rounds: int) -> list[Place]:
-        """The steps that may follow a step, after some rounds of its routine in the same moment."""
+        """The steps that may follow a step after some rounds of its routine in the same moment."""
         routines = self._program[stream]
         if not self._ends(place, stream):
             return [Place(place.routine, place.step + 1)]
-        # Which round it was cannot be told, but that it was the last one if all were seen.
+        # The round is unknown, except that it was the last one if all were seen.
         again = rounds < routines[place.routine].rounds
         return [Place(place.routine, 0)] * again + [Place(place.routine + 1, 0)] * (
             place.routine + 1 < len(routines)
@@ -266,7 +266,7 @@ class _Reading:
         return _ReadStep(tuple(guards), action, min(rows), sum(rows))
 
     def _guard(self, stream: int, number: int, place: int) -> Guard:
-        """What must hold before a step."""
+        """The guard of a step."""
         here = Place(number, place)
         if place:
             border = _Border(stream, Place(number, place - 1), here)
@@ -281,12 +281,12 @@ class _Reading:
         sure = self._after_all.get(border, _Events())
         if len(sure.moments) >= _FEWEST_ROUNDS:
             return self._told_by(sure, here=here, stream=stream)
-        # Where the routine before would go on from the beginning, it also ends by failing.
+        # The routine before it also ends by failing where it would continue from the beginning.
         where = self._again(stream, number - 1)
         return self._told_by(self._borders.get(border, _Events()), where, here, stream)
 
     def _again(self, stream: int, number: int) -> Guard | None:
-        """What must hold before another round, None if there is none or it was rarely seen."""
+        """The guard of another round; None if there is none, or if it was rarely seen."""
         routine = self._program[stream][number]
         border = _Border(stream, Place(number, len(routine.steps) - 1), Place(number, 0))
         if len(self._borders.get(border, _Events()).moments) < _FEWEST_ROUNDS:
@@ -296,11 +296,11 @@ class _Reading:
     def _told_by(
         self, events: _Events, where: Guard | None = None, here: Place = _START, stream: int = 0
     ) -> Guard:
-        """What decides on going on to a place of a stream.
+        """The conditions for continuing at a place of a stream.
 
         Args:
-            events: When that might have happened.
-            where: What must hold for them to count.
+            events: When this might have happened.
+            where: Conditions for events to count.
             here: The place.
             stream: The stream.
         """
@@ -313,7 +313,7 @@ class _Reading:
         return guard(states, went_on, self._features, _CONTRAST)
 
     def _where_begun(self, stream: int, here: Place) -> Guard:
-        """What tells the moments in which a stream begins at a place from all others."""
+        """The conditions for a stream to begin at a place."""
         begun = np.zeros(len(self._shown), dtype=bool)
         begun[list(self._begun.get((stream, here), ()))] = True
         return guard(self._shown.states, begun, self._features, _CONTRAST_AT_BEGINNING)

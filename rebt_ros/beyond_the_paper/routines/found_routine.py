@@ -1,4 +1,4 @@
-"""A routine that was found, whatever it was found by."""
+"""A found routine, independent of the search."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ class FoundRoutine:
 
     subtree: nodes.Sequence | nodes.Repeater
     support: int
-    """How often it was gone through: as often as the rarest of its actions was done in it."""
+    """How often it was done: as often as its rarest action was done in it."""
     rows: int
-    """How many rows it explains."""
+    """Number of rows that it explains."""

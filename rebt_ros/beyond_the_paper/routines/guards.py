@@ -1,8 +1,8 @@
-"""Guards: the conditions under which a routine goes on with its next step.
+"""Guards: the conditions under which a routine continues with its next step.
 
-Whether it went on in a state is one bit, whose probability is high where the guard holds and low
-elsewhere.  The guard is searched for among conjunctions of clauses, each a literal or an OR of two,
-by the gain in likelihood that each clause brings, less what it costs to say which one it is.
+Whether it continued in a state is one bit, whose probability is high where the guard holds and low
+elsewhere.  The search is over conjunctions of clauses, each a literal or an OR of two.  A clause is
+worth its gain in likelihood, minus the cost of naming it.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from rebt_ros.logic.conditions import (
 Clause: TypeAlias = tuple[Literal, ...]
 Guard: TypeAlias = tuple[Clause, ...]
 
-#: States that are looked at, thresholds that are tried, and clauses of a guard at most.
+#: Maximum number of states, of thresholds per feature, and of clauses of a guard.
 _MOST_STATES = 6000
 _THRESHOLDS = 37
 _MOST_CLAUSES = 6
-#: Categories of a feature, and features, of which clauses of two literals are made.
+#: Maximum number of categories of a feature, and of conditions for clauses of two literals.
 _MOST_CATEGORIES = 20
 _MOST_PAIRED = 40
-#: Fewer events than this prove nothing.
+#: Minimum number of events as evidence.
 _FEWEST = 15
 #: Nats that a clause must gain beyond its price.
 _GAIN = 5.0
@@ -45,11 +45,11 @@ _GAIN = 5.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Clauses:
-    """Everything that a guard may be made of."""
+    """All clauses that a guard may consist of."""
 
     clauses: tuple[Clause, ...]
     holds: FloatArray
-    """Where each one holds, 0 or 1, shape (states, clauses)."""
+    """Where each clause holds, 0 or 1, shape (states, clauses)."""
 
 
 def guard(
@@ -61,11 +61,11 @@ def guard(
         states: Shape (events, features).
         went_on: Whether it happened, shape (events,).
         features: The columns of `states`.
-        contrast: Where a clause does not hold, it must happen at most this often, as a share of
-            how often it happens where it does.
+        contrast: Maximum ratio of how often it happens where a clause does not hold to how often it
+            happens where the clause holds.
 
     Returns:
-        Clauses that all have to hold; empty where nothing is decided by the state.
+        Clauses that all have to hold; empty if the state does not decide.
     """
     if len(states) > _MOST_STATES:
         taken = np.linspace(0, len(states) - 1, _MOST_STATES).astype(np.int64)
@@ -102,7 +102,7 @@ def guard(
 
 
 def holds(guard: Guard, states: FloatArray, features: Sequence[Feature]) -> BoolArray:
-    """In which states a guard holds.
+    """The states in which a guard holds.
 
     Args:
         guard: Conditions on the features.
@@ -130,7 +130,7 @@ def _share(some: FloatArray, of: FloatArray) -> FloatArray:
 
 
 def _log_likelihood(hits: FloatArray, of: FloatArray) -> FloatArray:
-    """Log likelihood of as many hits where each has the same probability."""
+    """Log likelihood of the number of hits, each with the same probability."""
     rate = np.clip(hits / np.maximum(of, 1e-9), 1e-4, 1 - 1e-4)
     likelihood: FloatArray = hits * np.log(rate) + (of - hits) * np.log(1 - rate)
     return likelihood
@@ -155,7 +155,7 @@ def _clauses(states: FloatArray, went_on: BoolArray, features: Sequence[Feature]
 def _conditions(
     feature: Feature, values: FloatArray, went_on: BoolArray
 ) -> list[tuple[Condition, BoolArray]]:
-    """Conditions on one feature; of the thresholds, the one that tells most."""
+    """Conditions on one feature, with only the most informative threshold."""
     match feature.kind:
         case FeatureKind.BINARY:
             return [(IsTrue(feature.name), values == 1)]

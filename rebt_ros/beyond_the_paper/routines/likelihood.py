@@ -1,19 +1,19 @@
-"""How probable programs make the words of moments.
+"""The likelihood of the words of moments under programs.
 
-A hidden Markov model reads a word from left to right.  Its state is the step that was done last, in
-which round, and what of a PSA step is done already.  From there the stream goes on with its next
-step, or stops for this moment, and a later stream takes over, at any of its steps: where it
-stopped in an earlier moment.  What the streams do in one moment hangs together, since they begin
-together and have run for equally long; so there are several kinds of moments, in each of which
-streams take part, and take over, with probabilities of their own.  All probabilities are learned
-from the words by expectation maximization; rows that fit nowhere are noise.
+A hidden Markov model reads a word from left to right.  Its state is the last step done, its round,
+and the members of a PSA step done so far.  From there the stream continues with its next step, or
+stops for this moment.  A later stream then takes over at any of its steps, where it stopped in an
+earlier moment.  What streams do in one moment is related, since they began together and have run
+equally long.  So there are several kinds of moments, each with probabilities of its own that
+streams take part and take over.  All probabilities are learned from the words by expectation
+maximization; rows that fit nowhere are noise.
 
-Probabilities of a word's beginning are counted in units of the noise's, to the power of its
-length, which keeps them within what 32 bits can hold.
+The probability of a prefix is divided by that of noise to the power of its length, to stay within
+the range of 32-bit floats.
 
-Axes of arrays, in this order: programs P, kinds of moments K, beginnings of words n, states S
-(R with the one before anything is done, which is the last), streams T (U with nobody, the last),
-borders B.  Programs with fewer states, streams or borders than others are padded.
+Axes of arrays, in this order: programs P, kinds of moments K, prefixes of words n, states S (R with
+the initial state as the last one), streams T (U with "nobody" as the last one), borders
+B.  Programs with fewer states, streams or borders than others are padded.
 """
 
 from __future__ import annotations
@@ -29,44 +29,44 @@ from rebt_ros.beyond_the_paper.routines.corpus import Corpus
 from rebt_ros.beyond_the_paper.routines.program import Program, complexity, places
 from rebt_ros.beyond_the_paper.routines.streams import StreamModel, stream_model
 
-#: Kinds of moments.  In the first one all streams are at their beginning.
+#: Number of kinds of moments.  In the first kind, all streams are at their beginning.
 _KINDS = 4
-#: What one more thing to be said about a program must be worth, in nats per moment.
+#: Price of a unit of a program's complexity, in nats per moment.
 _PRICE = 20 / 15_000
-#: Probability that a row belongs to nothing that the program knows.
+#: Probability that a row belongs to no step of the program.
 _NOISE = 0.01
-#: Probabilities are not below it, so that they have a logarithm.
+#: Lower bound of probabilities, for logarithms.
 _LEAST = np.float32(1e-30)
 
 
 class _Read(NamedTuple):
-    """The forward pass over the beginnings of words that have one length."""
+    """The forward pass over the prefixes of one length."""
 
     before: Float32Array
-    """Probabilities of their beginnings without the last action and a state, shape (P, K, n, R)."""
+    """Probabilities of the prefixes without the last action and of a state, shape (P, K, n, R)."""
     stopped_before: Float32Array
-    """That the next to do something is one of the streams from here on, shape (P, K, n, U)."""
+    """Probability that the next to act is one of the streams from here on, shape (P, K, n, U)."""
     took_over: Float32Array
-    """That a stream takes over then, at the stream of each state, shape (P, K, n, S)."""
+    """Probability that the stream of each state takes over then, shape (P, K, n, S)."""
     here: Float32Array
-    """As `before`, of the beginnings themselves."""
+    """As `before`, for the prefixes themselves."""
     stopped: Float32Array
     ended: Float32Array
     """Probability that the word ends here, shape (P, n)."""
     cut: Float32Array
-    """Probability of the beginning, shape (P, n)."""
+    """Probability of the prefix, shape (P, n)."""
 
 
 class _Expected:
-    """How often things are expected to have happened."""
+    """Expected numbers of events."""
 
     def __init__(self, programs: int, states: int, streams: int) -> None:
-        #: A stream took over, of those from one on, shape (P, K, U, T); in a state, (P, K, S).
+        #: A stream took over among those from one on, shape (P, K, U, T); in a state, (P, K, S).
         self.taken = np.zeros((programs, _KINDS, streams + 1, streams), np.float32)
         self.entered = np.zeros((programs, _KINDS, states), np.float32)
         #: No stream did, shape (P, K, U).
         self.ended = np.zeros((programs, _KINDS, streams + 1), np.float32)
-        #: A stream went on from a state, or stopped there, shape (P, R).
+        #: A stream continued from a state, or stopped there, shape (P, R).
         self.went_on = np.zeros((programs, states + 1), np.float32)
         self.stopped = np.zeros((programs, states + 1), np.float32)
         #: Moments were of a kind, shape (P, K).
@@ -74,11 +74,11 @@ class _Expected:
 
 
 class Models:
-    """Programs with probabilities, learned all at once.
+    """Programs with probabilities, learned together.
 
     Args:
         programs: At least one, each of at least one stream.
-        corpus: What is read.
+        corpus: The words.
     """
 
     def __init__(self, programs: Sequence[Program], corpus: Corpus) -> None:
@@ -93,7 +93,7 @@ class Models:
         self._within = np.zeros((count, states + 1, states), np.float32)
         self._after = np.zeros_like(self._within)
         self._stops = np.ones((count, states + 1), np.float32)
-        #: Those who have none have the last one, on which nothing goes on.
+        #: States without a border have the last one, at which nothing continues.
         self._border = np.full((count, states + 1), borders)
         self._first = np.zeros((count, states), np.float32)
         self._enters = np.zeros((count, _KINDS, states), np.float32)
@@ -107,10 +107,10 @@ class Models:
             self._place(number, one, action[number], stream_of[number])
         self._enters[:, 0] = self._first
         follows = np.append(stream_of + 1, np.zeros((count, 1), dtype=np.int64), axis=1)
-        #: One where a state is of a stream, shape (P, S, T), and transposed.
+        #: 1 where a state belongs to a stream, shape (P, S, T), and transposed.
         self._to_stream = _marks(stream_of, streams)
         self._of_stream = np.ascontiguousarray(self._to_stream.swapaxes(1, 2))
-        #: One where the streams from one on may take over from a state, shape (P, R, U).
+        #: 1 where the streams from one on may take over from a state, shape (P, R, U).
         self._follows = _marks(follows, streams + 1)
         self._of_border = np.ascontiguousarray(_marks(self._border, borders).swapaxes(1, 2))
         self._emits = [
@@ -127,7 +127,7 @@ class Models:
     def _place(
         self, number: int, parts: list[StreamModel], action: IntArray, stream_of: IntArray
     ) -> None:
-        """Puts the streams of a program into its rows of the arrays, one behind the other."""
+        """Puts the streams of a program into its rows of the arrays, one after another."""
         begin, borders = 0, 0
         for stream, part in enumerate(parts):
             mine = slice(begin, begin + len(part.states))
@@ -145,10 +145,10 @@ class Models:
         """Learns the probabilities.
 
         Args:
-            rounds: Of expectation maximization.
+            rounds: Rounds of expectation maximization.
 
         Returns:
-            Log likelihood of the corpus less the price of each program in nats, shape (P,).
+            Log likelihood of the corpus minus the price of each program in nats, shape (P,).
         """
         likelihood = self._read()
         for _ in range(rounds):
@@ -161,11 +161,11 @@ class Models:
         """Probabilities of a program.
 
         Args:
-            number: Of the program; it is not padded if it is the largest one.
+            number: Number of the program, which is not padded if it is the largest one.
 
         Returns:
-            To move from each state, or none yet, to each state, shape (K, R, S); that a word ends
-            there, shape (K, R); of each kind of moments, shape (K,).
+            Probabilities to move from each state, or none yet, to each state, shape (K, R, S); that
+            a word ends there, shape (K, R); of each kind of moments, shape (K,).
         """
         takes_over = self._leaves[number] @ self._reach[number] @ self._of_stream[number]
         moves = self._stays[number] + takes_over * self._enters[number][:, None]
@@ -173,19 +173,19 @@ class Models:
         return moves.astype(float), ends.astype(float), self._kind[number].astype(float)
 
     def goes_on(self, number: int) -> FloatArray:
-        """Probabilities of a program to go on at each border, shape (borders,)."""
+        """Probabilities that a program continues at each border, shape (borders,)."""
         return self._goes_on[number, :-1].astype(float)
 
     def _assemble(self) -> None:
         """Probabilities of all moves from those of their parts."""
         going_on = np.take_along_axis(self._goes_on, self._border, axis=1)
-        #: To go on in the same stream, shape (P, R, S), and transposed.
+        #: Continuing in the same stream, shape (P, R, S), and transposed.
         self._stays = self._within + going_on[:, :, None] * self._after
         self._stayed = np.ascontiguousarray(self._stays.swapaxes(1, 2))
-        #: To let the streams from one on take over, shape (P, R, U), and transposed.
+        #: Leaving it to the streams from one on, shape (P, R, U), and transposed.
         self._leaves = self._follows * (self._stops * (1 - going_on))[:, :, None]
         self._left = np.ascontiguousarray(self._leaves.swapaxes(1, 2))
-        #: That a stream takes over, of those from one on, shape (P, K, U, T), or nobody (P, K, U).
+        #: A stream takes over among those from one on, shape (P, K, U, T), or nobody (P, K, U).
         self._reach = np.zeros((*self._kind.shape, self._streams + 1, self._streams), np.float32)
         self._nobody = np.ones((*self._kind.shape, self._streams + 1), np.float32)
         for stream in reversed(range(self._streams)):
@@ -195,7 +195,7 @@ class Models:
             self._reach[:, :, stream, stream] = 1 - idle
 
     def _read(self) -> FloatArray:
-        """Forward pass over all words at once; their log likelihoods in nats, shape (P,)."""
+        """Forward pass over all words; returns log likelihoods in nats, shape (P,)."""
         here = np.zeros((*self._kind.shape, 1, self._states + 1), np.float32)
         here[:, :, 0, -1] = self._kind
         stopped = _times(here, self._leaves)
@@ -217,9 +217,9 @@ class Models:
         return likelihood
 
     def _expect(self) -> _Expected:
-        """Backward pass: how often everything is expected to have happened."""
+        """Backward pass: the expected number of all events."""
         expected = _Expected(len(self._kind), self._states, self._streams)
-        # What comes behind the beginnings of a level, where the stream goes on, and where it stops.
+        # Likelihood after the prefixes of a level, if the stream continues, and if it stops.
         rest = np.zeros(1, np.float32)
         others = np.zeros(1, np.float32)
         for level, emits, read in reversed(
@@ -275,7 +275,7 @@ class Model:
 
     Args:
         program: At least one stream.
-        corpus: What is read.
+        corpus: The words.
     """
 
     def __init__(self, program: Program, corpus: Corpus) -> None:
@@ -300,24 +300,24 @@ class Model:
         """Learns the probabilities.
 
         Args:
-            rounds: Of expectation maximization.
+            rounds: Rounds of expectation maximization.
 
         Returns:
-            Log likelihood of the corpus less the price of the program, in nats.
+            Log likelihood of the corpus minus the price of the program, in nats.
         """
         return float(self._models.fit(rounds)[0])
 
     @property
     def goes_on(self) -> FloatArray:
-        """Probability to go on at each border between two steps, shape (borders,)."""
+        """Probability of continuing at each border between two steps, shape (borders,)."""
         return self._models.goes_on(0)
 
     def explain(self, word: tuple[int, ...], cut: bool) -> list[int | None]:
-        """The most probable state after each action of a word (Viterbi), None for noise.
+        """The most probable state after each action of a word (Viterbi); None for noise.
 
         Args:
-            word: Actions of one moment, as long as is read.
-            cut: Whether it goes on behind them.
+            word: The actions of a moment that are read.
+            cut: Whether the moment continues after them.
         """
         moves, ends, kinds = self._models.moves(0)
         size = len(self.states)
@@ -351,19 +351,19 @@ def _times(some: Float32Array, matrix: Float32Array) -> Float32Array:
 
 
 def _per_word(count: FloatArray, probability: Float32Array) -> Float32Array:
-    """How much a word counts per unit of its probability, shape (P, 1, n, 1)."""
+    """Weight of a word divided by its probability, shape (P, 1, n, 1)."""
     share: Float32Array = (count / probability).astype(np.float32)[:, None, :, None]
     return share
 
 
 def _marks(number: IntArray, size: int) -> Float32Array:
-    """One at each number's place, shape (P, numbers, size)."""
+    """One-hot vectors of the numbers, shape (P, numbers, size)."""
     marks: Float32Array = (number[:, :, None] == np.arange(size)).astype(np.float32)
     return marks
 
 
 def _first_guess(streams: int) -> Float32Array:
-    """Probabilities of each stream to do nothing, different for each kind of moments."""
+    """Initial probabilities that each stream does nothing, different for each kind of moment."""
     idle = np.full((_KINDS, streams), 0.5, np.float32)
     period = max(2, min(streams, _KINDS - 1))
     for kind, stream in product(range(1, _KINDS), range(streams)):

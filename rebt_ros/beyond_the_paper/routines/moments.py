@@ -1,4 +1,4 @@
-"""Moments: the rows that share one state, and what was done in them."""
+"""Moments: rows that share a state, and what was done in them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray, in_parts
 from rebt_ros.demonstration.table import DemonstrationTable
 
-#: Positions of actions in the order in which they were done.
+#: Positions of actions, in the order in which they were done.
 Word = tuple[int, ...]
 
-#: Moments that are looked at; of more, as many are taken from all over the demonstrations.
+#: Maximum number of moments, taken from all over the demonstrations.
 _MOST_MOMENTS = 25_000
 
 
@@ -20,17 +20,17 @@ _MOST_MOMENTS = 25_000
 class Moments:
     """What was done in which state.
 
-    Rows that follow each other in one state are one moment: nothing but the robot's own doing lies
-    between them, so that what stands in one moment was decided on one and the same state.
+    Consecutive rows in one state are a moment: nothing but the robot's own actions lies between
+    them, so the actions of a moment were decided on the same state.
     """
 
     actions: tuple[str, ...]
     words: tuple[Word, ...]
-    """The different words, the one with the most rows first."""
+    """The different words, by their number of rows, descending."""
     counts: IntArray
-    """How many moments have each word, shape (words,)."""
+    """Number of moments with each word, shape (words,)."""
     word: IntArray
-    """Position in `words` of each moment's word, shape (moments,)."""
+    """Position in `words` of the word of each moment, shape (moments,)."""
     states: FloatArray
     """State of each moment, shape (moments, features)."""
 
@@ -46,14 +46,14 @@ class Moments:
 
 
 def moments(table: DemonstrationTable) -> Moments:
-    """Gathers the rows of a table that share one state."""
+    """Gathers the rows of a table that share a state."""
     begins = np.ones(len(table), dtype=bool)
     if len(table) > 1:
-        # What was before tells rows of one state apart.
+        # Lagged features distinguish rows of one state.
         now = [place for place, feature in enumerate(table.features) if not feature.lag]
         alike: BoolArray = np.diff(table.demonstration) == 0
         if not now:
-            # Without a state there is but the time to tell moments apart.
+            # Without a state, only time distinguishes moments.
             alike &= np.diff(table.stamps) == 0
         for rows in in_parts(len(alike)):
             states = table.states[rows.start : rows.stop + 1]

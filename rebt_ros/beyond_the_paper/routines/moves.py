@@ -1,4 +1,4 @@
-"""Programs that differ from another one by a single change."""
+"""Programs that differ from a given one by a single change."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from rebt_ros.beyond_the_paper.routines.program import (
     tidy,
 )
 
-#: Members of a step, and states of a model: more would take too long.
+#: Maximum number of members of a step, and of states of a model; more would take too long.
 _MOST_MEMBERS = 4
 MOST_STATES = 100
-#: Share of the rarer one's rows in which one action must follow another to be put next to it.
+#: Actions may be adjacent if one follows the other in this share of the rarer action's rows.
 _LINKED = 0.04
 
 
@@ -25,9 +25,9 @@ def neighbours(program: Program, corpus: Corpus, rounds: int) -> list[Program]:
     """All programs that are one change away, each once.
 
     Args:
-        program: Where to begin; may be empty.
-        corpus: Tells which actions follow each other.
-        rounds: How often routines are repeated if they are.
+        program: The given program; may be empty.
+        corpus: Words that show which actions follow each other.
+        rounds: Number of rounds of new Repeaters.
     """
     changed = (tidy(change) for change in _changes(program, _Links(corpus), rounds))
     return [
@@ -38,7 +38,7 @@ def neighbours(program: Program, corpus: Corpus, rounds: int) -> list[Program]:
 
 
 class _Links:
-    """Which actions may stand next to each other."""
+    """Which actions may be adjacent."""
 
     def __init__(self, corpus: Corpus) -> None:
         rows = corpus.share * max(corpus.followers.sum(), 1.0)
@@ -47,7 +47,7 @@ class _Links:
         self.actions = range(corpus.actions)
 
     def between(self, before: Step, after: Step) -> Iterator[int]:
-        """Actions that follow one of `before` and are followed by one of `after`, if there are."""
+        """Actions that follow one of `before` and precede one of `after`, if there are any."""
         for action in self.actions:
             follows = not before or any(self._linked[one][action] for one in before)
             if follows and (not after or any(self._linked[action][one] for one in after)):
@@ -73,7 +73,7 @@ def _changes(program: Program, links: _Links, rounds: int) -> Iterator[Program]:
 def _stream_changes(
     stream: Stream, number: int, links: _Links, rounds: int
 ) -> Iterator[tuple[Stream, ...]]:
-    """What may stand in place of a stream when one of its routines changes."""
+    """Replacements of a stream by a change of one of its routines."""
     before, routine, behind = stream[:number], stream[number], stream[number + 1 :]
     for steps in _step_changes(routine, links):
         yield ((*before, Routine(routine.rounds, steps), *behind),)
@@ -128,7 +128,7 @@ def _step_changes(routine: Routine, links: _Links) -> Iterator[tuple[Step, ...]]
 
 
 def _instead_of(step: Step, links: _Links) -> Iterator[tuple[Step, ...]]:
-    """What may stand in place of a step."""
+    """Replacements of a step."""
     for place, member in enumerate(step):
         others = step[:place] + step[place + 1 :]
         yield (others,)

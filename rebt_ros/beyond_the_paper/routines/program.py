@@ -3,13 +3,13 @@
 step
     An action, or several that are done together (PSA), in the order in which they are tried.
 routine
-    Steps one after the other, gone through once or several times.
+    Steps one after another, gone through once or several times.
 stream
-    Routines one after the other.
+    Routines one after another.
 program
-    Streams side by side; in each moment every stream goes on for a while, one after the other.
+    Streams side by side; in each moment every stream continues for a while, one after another.
 
-All are tuples of positions of actions, because a search looks at thousands of them.
+All are tuples of positions of actions, because a search tries thousands of them.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ Step: TypeAlias = tuple[int, ...]
 
 
 class Routine(NamedTuple):
-    """Steps that are gone through one after the other."""
+    """Steps that are done one after another."""
 
     rounds: int
-    """How often; a Repeater where more than once."""
+    """How often they are done; a Repeater if more than once."""
     steps: tuple[Step, ...]
 
 
@@ -32,14 +32,14 @@ Program: TypeAlias = tuple[Stream, ...]
 
 
 class Place(NamedTuple):
-    """Where a step stands in a stream whose rounds are written out."""
+    """The place of a step in a stream with all its rounds."""
 
     routine: int
     step: int
 
 
 def places(stream: Stream) -> tuple[Place, ...]:
-    """The steps of a stream in the order in which they are done, all rounds."""
+    """The steps of a stream in the order in which they are done, with all rounds."""
     return tuple(
         Place(number, step)
         for number, routine in enumerate(stream)
@@ -49,7 +49,7 @@ def places(stream: Stream) -> tuple[Place, ...]:
 
 
 def tidy(program: Program) -> Program:
-    """The same program without empty parts, neighbouring routines of one round joined."""
+    """The same program without empty parts, with adjacent routines of one round joined."""
     streams = []
     for stream in program:
         routines: list[Routine] = []
@@ -67,7 +67,7 @@ def tidy(program: Program) -> Program:
 
 
 def complexity(program: Program) -> int:
-    """How much has to be said to write a program down."""
+    """The size of a description of a program."""
     return sum(
         3
         + sum(
@@ -79,7 +79,7 @@ def complexity(program: Program) -> int:
 
 
 def states_needed(program: Program) -> int:
-    """How many states a model of the program has; see `likelihood`."""
+    """Number of states of a model of the program; see `likelihood`."""
     return sum(
         rounds * sum(len(step) * 2 ** (len(step) - 1) for step in steps)
         for stream in program

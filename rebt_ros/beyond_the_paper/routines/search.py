@@ -1,4 +1,4 @@
-"""The program that explains what was done in moments best."""
+"""The program that best explains what was done in moments."""
 
 from __future__ import annotations
 
@@ -11,36 +11,36 @@ from rebt_ros.beyond_the_paper.routines.moments import Moments, Word
 from rebt_ros.beyond_the_paper.routines.moves import MOST_STATES, neighbours
 from rebt_ros.beyond_the_paper.routines.program import Program, Routine, Stream, states_needed, tidy
 
-#: Searches that begin with a word, those of them that are brought to an end, and how often streams
-#: of what they found are put together anew.
+#: Number of searches that begin with a word, of those that are completed, and of recombinations of
+#: the streams that they found.
 _BEGINNINGS = 4
 _FINALISTS = 3
 _RECOMBINATIONS = 2
-#: Programs that a search looks at at first, and to the end.
+#: Maximum number of programs that a search tries at first, and in total.
 _FEW, _MANY = 250, 700
-#: How often what is repeated is taken to be repeated, and what is tried in the end.
+#: Rounds of Repeaters during the search, and further rounds tried at the end.
 _ROUNDS = 3
 _OTHER_ROUNDS = (2, 4, 5, 6)
-#: Words that a search may begin with, and the longest of them.
+#: Number of words that a search may begin with, and their maximum length.
 _CANDIDATES = 12
 _LONGEST = 18
-#: Programs that are judged before the best of them is taken.
+#: Number of programs that are judged before the best of them is taken.
 _AT_ONCE = 40
-#: Rounds of expectation maximization: at first sight, and before a program is taken.
+#: Rounds of expectation maximization: for a first look, and before a program is taken.
 _GLANCE, _LOOK = 1, 5
-#: Programs whose probabilities are learned together; more do not fit into the processor's cache.
+#: Number of programs learned together; more do not fit into the processor's cache.
 _TOGETHER = 8
-#: What a program must gain at first sight to be taken at once, and at a closer look, in nats.
+#: Gain for which a program is taken at first look, and at a closer look, in nats.
 _PROMISING, _GAIN = -40.0, 3.0
-#: Programs that get a closer look when none was taken at once.
+#: Number of programs that get a closer look if none was taken at first.
 _CLOSER = 8
 
 
 class _Judged(NamedTuple):
-    """A program with what it is worth."""
+    """A program with its value."""
 
     score: float
-    """In nats."""
+    """Value in nats."""
     program: Program
 
 
@@ -78,12 +78,12 @@ def _with_rounds(program: Program, rounds: int) -> Program:
 
 
 def _first(corpus: Corpus) -> Program:
-    """Does nothing but the most frequent action."""
+    """The program that only does the most frequent action."""
     return ((Routine(1, ((int(corpus.share.argmax()),),)),),)
 
 
 def _beginnings(moments: Moments, corpus: Corpus, rounds: int) -> list[Program]:
-    """One stream that does what a long word says, for the words with which that explains most."""
+    """Programs of one stream that does a long word, for the words that explain most."""
     often = [
         (len(word) * min(count, 20) ** 0.25, word)
         for word, count in zip(moments.words, moments.counts.tolist(), strict=True)
@@ -97,7 +97,7 @@ def _beginnings(moments: Moments, corpus: Corpus, rounds: int) -> list[Program]:
 
 
 def _recombined(best: _Judged, streams: list[Stream], corpus: Corpus) -> _Judged | None:
-    """The program with a stream of another one, if that is better."""
+    """The program with a stream of another program, if that is better."""
     program = best.program
     changed = dict.fromkeys(
         (*program[:place], stream, *program[end:])
@@ -110,7 +110,7 @@ def _recombined(best: _Judged, streams: list[Stream], corpus: Corpus) -> _Judged
 
 
 def fold(word: Word, rounds: int) -> Stream:
-    """A stream that does what a word says, with what is repeated as routines of some rounds.
+    """A stream that does a word, with repetitions as routines of the given number of rounds.
 
     >>> fold((0, 1, 2, 1, 2, 3), rounds=3)
     (Routine(rounds=1, steps=((0,),)), Routine(rounds=3, steps=((1,), (2,))), \
@@ -128,7 +128,7 @@ Routine(rounds=1, steps=((3,),)))
 
 
 def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
-    """Takes better neighbours until there is none, or enough have been looked at."""
+    """Moves to better neighbors until there are none, or until enough have been tried."""
     draw = Random(0)
     seen = {best.program}
     looked = 0
@@ -139,7 +139,7 @@ def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
             if neighbour not in seen
         ]
         draw.shuffle(waiting)
-        # With many actions there are more neighbours than can be looked at.
+        # With many actions, there are more neighbors than can be tried.
         waiting = waiting[: most - looked]
         glanced: list[_Judged] = []
         better = None
@@ -160,7 +160,7 @@ def _climb(best: _Judged, corpus: Corpus, rounds: int, most: int) -> _Judged:
 
 
 def _better_than(best: _Judged, judged: list[_Judged], corpus: Corpus) -> _Judged | None:
-    """The first of the most promising programs that is better at a closer look."""
+    """The first of the most promising programs that proves better at a closer look."""
     promising = [one.program for one in sorted(judged, reverse=True)[:_CLOSER]]
     for one in _judge(promising, corpus, _LOOK):
         if one.score > best.score + _GAIN:
@@ -169,7 +169,7 @@ def _better_than(best: _Judged, judged: list[_Judged], corpus: Corpus) -> _Judge
 
 
 def _judge(programs: list[Program], corpus: Corpus, rounds: int) -> list[_Judged]:
-    """What programs are worth after some rounds of expectation maximization."""
+    """The values of programs after some rounds of expectation maximization."""
     judged: list[_Judged] = []
     for begin in range(0, len(programs), _TOGETHER):
         some = programs[begin : begin + _TOGETHER]

@@ -1,7 +1,7 @@
-"""What a stream contributes to a model: its states, and what follows what.
+"""The part of a stream in a model: its states, and the moves between them.
 
-The states of a step hang on nothing but how many members it has, and a stream is its steps one
-after the other; so a stream is put together from blocks, one for each step in each round.
+The states of a step depend only on its number of members, and a stream is a series of steps.  So a
+stream is assembled from blocks, one for each step in each round.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from rebt_ros.beyond_the_paper.routines.program import Place, Step, Stream, plac
 
 
 class State(NamedTuple):
-    """What a stream did last."""
+    """The last action of a stream."""
 
     stream: int
     place: int
-    """Of the step, all rounds counted."""
+    """Position of the step, with all rounds."""
     done: int
     """Which members of the step are done, one bit each."""
     member: int
-    """The last one."""
+    """The last member done."""
 
     def completes(self, step: Step) -> bool:
-        """Whether the step is done with it."""
+        """Whether this completes the step."""
         return self.done == (1 << len(step)) - 1
 
 
@@ -38,37 +38,37 @@ class StreamModel:
     """The states of a stream and the moves between them."""
 
     states: tuple[State, ...]
-    """As of stream 0."""
+    """States, numbered as if this were stream 0."""
     action: IntArray
-    """What is done in each state, shape (states,)."""
+    """The action of each state, shape (states,)."""
     within: Float32Array
-    """Probability of the next member of a step that is not done yet, shape (states, states)."""
+    """Probability of the next member of an incomplete step, shape (states, states)."""
     stops: FloatArray
-    """Probability to stop within a step; 1 where it is done, shape (states,)."""
+    """Probability of stopping within a step; 1 where it is complete, shape (states,)."""
     after: Float32Array
-    """How the next step begins where one is done, 0 elsewhere, shape (states, states)."""
+    """Probability of beginning the next step after a complete one, shape (states, states)."""
     border: IntArray
-    """Which of the stream's borders lies behind a state; -1 where none does, shape (states,)."""
+    """The border after a state, or -1, shape (states,)."""
     borders: int
-    """How many there are; rounds of a routine share them."""
+    """Number of borders; the rounds of a routine share them."""
     first: FloatArray
-    """How the first step begins, shape (states,)."""
+    """Probability of beginning the first step, shape (states,)."""
     anywhere: FloatArray
-    """How the stream goes on from anywhere, shape (states,)."""
+    """Probability of resuming the stream anywhere, shape (states,)."""
 
 
 class _Block(NamedTuple):
     """The states of one step."""
 
     states: tuple[tuple[int, int], ...]
-    """Which members are done, and the last one."""
+    """The members done, and the last one."""
     within: FloatArray
     stops: FloatArray
     complete: IntArray
     begins: FloatArray
-    """How the step begins."""
+    """Probability of beginning the step."""
     goes_on: FloatArray
-    """How it goes on from each set of done members, added up."""
+    """Probability of continuing it, summed over all sets of done members."""
 
 
 @lru_cache(maxsize=512)
@@ -77,7 +77,7 @@ def stream_model(stream: Stream, persistence: float) -> StreamModel:
 
     Args:
         stream: At least one step.
-        persistence: Probability that a member of a step is done next, rather than a later one.
+        persistence: Probability that the next member of a step is done, rather than a later one.
     """
     order = places(stream)
     steps = [stream[place.routine].steps[place.step] for place in order]
@@ -128,7 +128,7 @@ def _block(members: int, persistence: float) -> _Block:
     everything = (1 << members) - 1
 
     def entering(done: int, after: int = -1) -> tuple[FloatArray, float]:
-        """Probability of each next member to be done, and of none."""
+        """Probability of each next member, and of none."""
         entry, left = np.zeros(len(states)), 1.0
         for member in range(after + 1, members):
             if not done >> member & 1:

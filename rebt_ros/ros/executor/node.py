@@ -31,7 +31,7 @@ from rebt_ros.ros.executor.tick_clock import TickClock
 from rebt_ros.ros.executor.tree_intake import TreeIntake
 from rebt_ros.ros.executor.tree_program import TreeProgram
 from rebt_ros.ros.executor.watching import Watching
-from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
+from rebt_ros.ros.quiet_events import create_publisher
 
 #: Time between two looks at what topics carry (seconds).
 _LOOK_PERIOD: Final = 0.5
@@ -74,9 +74,7 @@ class ExecutorNode(Node):
         channels.follow([DEFAULT_CHANNEL])
         histories: dict[str, ActionHistory] = {}
         preparation = Preparation(settings, channels, histories, rule_check(settings))
-        says = self.create_publisher(
-            Bool, "~/driving", DRIVING_QOS, event_callbacks=QUIET_PUBLISHER
-        )
+        says = create_publisher(self, Bool, "~/driving", DRIVING_QOS)
         clock = TickClock(self, self._on_clock_set_back)
         self._driving = Driving(
             settings,

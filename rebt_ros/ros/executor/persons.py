@@ -17,7 +17,7 @@ from rebt_ros.ros.command_channels import CommandChannels
 from rebt_ros.ros.executor.driving import Driving
 from rebt_ros.ros.executor.robot_commands import RobotCommands
 from rebt_ros.ros.executor.settings import ExecutorSettings
-from rebt_ros.ros.quiet_events import QUIET_SUBSCRIPTION
+from rebt_ros.ros.quiet_events import create_subscription
 from rebt_ros.ros.robot_files import RobotTopics
 
 #: Messages of a person that may wait.
@@ -49,13 +49,7 @@ class Persons:
         self._driving = driving
         self._topics = self._topics_of_robot(settings, commands)
         self.subscriptions: Sequence[Subscription] = [
-            node.create_subscription(
-                String,
-                topic,
-                partial(self._on_label, topic),
-                _DEPTH,
-                event_callbacks=QUIET_SUBSCRIPTION,
-            )
+            create_subscription(node, String, topic, partial(self._on_label, topic), _DEPTH)
             for topic in self._takeover_topics
         ]
         """Those of topics of labels."""

@@ -23,7 +23,7 @@ from rebt_ros.ros.executor.state_topics import StateTopics
 from rebt_ros.ros.executor.tree_intake import REFUSED, TreeIntake
 from rebt_ros.ros.executor.watching import Watching
 from rebt_ros.ros.graph_watch import Finding, GraphWatch
-from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
+from rebt_ros.ros.quiet_events import create_publisher
 
 #: Least time between two snapshots (seconds).
 _SNAPSHOT_PERIOD: Final = 0.2
@@ -72,9 +72,7 @@ class Reporting:
         self._watch = GraphWatch(node)
         self._last_snapshot = ""
         self._watchers = 0
-        self._snapshot = node.create_publisher(
-            String, "~/snapshot", 10, event_callbacks=QUIET_PUBLISHER
-        )
+        self._snapshot = create_publisher(node, String, "~/snapshot", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(_SNAPSHOT_PERIOD, self._publish_snapshot, clock=steady)
         self._diagnostics = Diagnostics(node, "execution", self._report)

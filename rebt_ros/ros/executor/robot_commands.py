@@ -24,7 +24,7 @@ from rebt_ros.robot_file.robot_file import (
 )
 from rebt_ros.ros.message_types import action_class, message_class, service_class
 from rebt_ros.ros.message_values import fill
-from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
+from rebt_ros.ros.quiet_events import create_publisher
 from rebt_ros.ros.topic_names import full_name
 
 #: What action_msgs/msg/GoalStatus calls a goal that was reached.
@@ -145,9 +145,7 @@ class RobotCommands:
         message = fill(kind(), self._place(label, "message", command.content))
         key = (command.topic, command.kind)
         if key not in self._publishers:
-            self._publishers[key] = self._node.create_publisher(
-                kind, command.topic, _DEPTH, event_callbacks=QUIET_PUBLISHER
-            )
+            self._publishers[key] = create_publisher(self._node, kind, command.topic, _DEPTH)
         publisher = self._publishers[key]
         stamped = hasattr(message, "header") and "header" not in command.content
 

@@ -19,7 +19,7 @@ from rebt_ros.ros.diagnostics import Faults
 from rebt_ros.ros.executor.robot_inputs import RobotInputs
 from rebt_ros.ros.executor.tree_program import TreeProgram
 from rebt_ros.ros.graph_watch import Finding
-from rebt_ros.ros.quiet_events import QUIET_SUBSCRIPTION
+from rebt_ros.ros.quiet_events import create_subscription
 
 #: The newest state only; best effort hears reliable publishers as well.
 _STATE_QOS: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -97,12 +97,9 @@ class StateTopics:
             self._node.destroy_subscription(self._plain.pop(topic))
             self._latest.pop(topic, None)
         for topic in sorted(topics - self._plain.keys()):
-            self._plain[topic] = self._node.create_subscription(
-                Float64MultiArray,
-                topic,
-                partial(self._on_state, topic),
-                _STATE_QOS,
-                event_callbacks=QUIET_SUBSCRIPTION,
+            on_state = partial(self._on_state, topic)
+            self._plain[topic] = create_subscription(
+                self._node, Float64MultiArray, topic, on_state, _STATE_QOS
             )
         if begins:
             for topic in self._latest:

@@ -12,7 +12,7 @@ from std_msgs.msg import String
 from rebt_ros.errors import MessagePathError
 from rebt_ros.export.watched import NodeStatus, WatchedNode, WatchedTree
 from rebt_ros.ros.message_types import message_class
-from rebt_ros.ros.quiet_events import QUIET_PUBLISHER
+from rebt_ros.ros.quiet_events import create_publisher
 
 XML_TOPIC: Final = "~/tree_xml"
 LOG_TOPIC: Final = "~/behavior_tree_log"
@@ -52,9 +52,7 @@ class StatusTopics:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._xml = node.create_publisher(
-            String, XML_TOPIC, _LATCHED, event_callbacks=QUIET_PUBLISHER
-        )
+        self._xml = create_publisher(node, String, XML_TOPIC, _LATCHED)
         self._tree: WatchedTree | None = None
         self._before: Mapping[int, str] = {}
         # Whether those who listen know the statuses of all nodes.
@@ -69,9 +67,7 @@ class StatusTopics:
                 f"their nodes: {err}"
             )
         else:
-            self._log = node.create_publisher(
-                self._types.log, LOG_TOPIC, _LOG_DEPTH, event_callbacks=QUIET_PUBLISHER
-            )
+            self._log = create_publisher(node, self._types.log, LOG_TOPIC, _LOG_DEPTH)
 
     @property
     def where(self) -> str:

@@ -21,7 +21,7 @@ from rebt_ros.ros.executor.driving import Driving
 from rebt_ros.ros.executor.preparation import Preparation, UnmeasurableError
 from rebt_ros.ros.executor.state_topics import StateTopics
 from rebt_ros.ros.executor.tree_program import TreeProgram
-from rebt_ros.ros.quiet_events import QUIET_SUBSCRIPTION
+from rebt_ros.ros.quiet_events import create_subscription
 from rebt_ros.ros.topic_names import check_topics
 from rebt_ros.storage.tree_file import read_tree
 
@@ -71,12 +71,8 @@ class TreeIntake:
         """Where trees come from, as it was given."""
         ready = node.create_guard_condition(self._take_prepared)
         self._background = Background(preparation.read, ready.trigger)
-        self.documents: Subscription = node.create_subscription(
-            String,
-            self.name,
-            self._on_document,
-            _TREE_QOS,
-            event_callbacks=QUIET_SUBSCRIPTION,
+        self.documents: Subscription = create_subscription(
+            node, String, self.name, self._on_document, _TREE_QOS
         )
         """What hears them."""
 
