@@ -23,6 +23,16 @@ _HOMES = {
     "taxi": "grids.Taxi",
     "empty": "grids.Empty",
     "doorkey": "grids.DoorKey",
+    "wall": "wheels.Wall",
+    "vacuum": "wheels.Vacuum",
+    "parking": "wheels.Parking",
+    "follow": "wheels.Follow",
+    "fetch": "wheels.Fetch",
+    "pendulum": "chores.Pendulum",
+    "thermostat": "chores.Thermostat",
+    "elevator": "chores.Elevator",
+    "sorter": "chores.Sorter",
+    "crossing": "chores.Crossing",
 }
 NAMES = tuple(_HOMES)
 #: What is driven unless tasks are named: of `knock` it is known that nobody learns it.
