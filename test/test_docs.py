@@ -254,8 +254,8 @@ def _data_of_rules() -> None:
 
     draw = random.Random(1)
     states = [(draw.random() * 2, draw.random(), draw.randrange(2)) for _ in range(200)]
-    rows = (f"{x:.3f},{x / 2:.3f},{b:.3f},{d},{action(x, b, d)}" for x, b, d in states)
-    _write(Path("demonstrations/1.csv"), "front,left,battery,docked,action", rows)
+    rows = (f"{x:.3f},{1 - x:.3f},{b:.3f},{d},{action(x, b, d)}" for x, b, d in states)
+    _write(Path("demonstrations/1.csv"), "front,target_bearing,battery,docked,action", rows)
     [rules] = re.findall(
         r"```yaml\n(# rules.yaml\n.*?)```", (_DOCS / "rules.md").read_text("utf-8"), re.DOTALL
     )
