@@ -185,30 +185,78 @@ class StateFinder:
             raise Unsettled
         return None
 
-    def beside(self, boxes: Boxes, at_a_time: int) -> Iterator[list[Near]]:
-        """States in some boxes, each the nearest to a row, those first that are closest to theirs.
+    def beside(
+        self, regions: Sequence[Boxes], at_a_time: Sequence[int]
+    ) -> list[Iterator[list[Near]]]:
+        """States in some regions, each the nearest to a row, those first that are closest to it.
 
         Args:
-            boxes: Any number of them; of many, only the row that is nearest to each is looked at.
-            at_a_time: How many states to look for together.
+            regions: Boxes of each; of many, only the row that is nearest to each is looked at.
+            at_a_time: How many states to look for, one time after the other.
+
+        Returns:
+            Of each region, what is found each time.
         """
-        count = len(self._shown)
-        if 0 < boxes.shape[1] * count <= _COMPARED_AT_A_TIME:
-            distances = self._distances(boxes).reshape(-1)
-            box, row = np.divmod(np.arange(len(distances)), count)
+        count = max(1, len(self._shown))
+        few = [0 < one.shape[1] * len(self._shown) <= _COMPARED_AT_A_TIME for one in regions]
+        together = [one for one, its in zip(regions, few, strict=True) if its]
+        # All at once: what numpy does once per call then does not matter.
+        compared = iter(self._distances_of(together))
+        found = []
+        for boxes, its in zip(regions, few, strict=True):
+            if its:
+                distances = next(compared).reshape(-1)
+                box, row = np.divmod(np.arange(len(distances)), count)
+            else:
+                distances, row = self.closest(boxes)
+                box = np.arange(boxes.shape[1])
+            found.append(self._in_order(boxes, distances, box, row, at_a_time))
+        return found
+
+    def _distances_of(self, regions: Sequence[Boxes]) -> Iterator[FloatArray]:
+        """As `_distances`, of each region."""
+        start = 0
+        while start < len(regions):
+            size, end = 0, start
+            while end < len(regions) and (
+                end == start
+                or (size + regions[end].shape[1]) * len(self._shown) <= _COMPARED_AT_A_TIME
+            ):
+                size += regions[end].shape[1]
+                end += 1
+            some = regions[start:end]
+            ends = np.cumsum([one.shape[1] for one in some])[:-1]
+            yield from np.split(self._distances(np.concatenate(some, axis=1)), ends)
+            start = end
+
+    def _in_order(
+        self,
+        boxes: Boxes,
+        distances: FloatArray,
+        box: IntArray,
+        row: IntArray,
+        at_a_time: Sequence[int],
+    ) -> Iterator[list[Near]]:
+        """See `beside`."""
+        most = sum(at_a_time)
+        if len(distances) > most:
+            # All others are farther away, and those that are as far stand behind.
+            limit = np.partition(distances, most - 1)[most - 1]
+            nearest = np.flatnonzero(distances <= limit)
+            order = nearest[np.argsort(distances[nearest], kind="stable")]
         else:
-            distances, row = self.closest(boxes)
-            box = np.arange(boxes.shape[1])
-        order = np.argsort(distances, kind="stable")
-        for start in range(0, len(order), at_a_time):
-            places = order[start : start + at_a_time]
+            order = np.argsort(distances, kind="stable")
+        start = 0
+        for size in at_a_time:
+            places = order[start : start + size]
+            start += size
             yield [
                 near
                 for one in places
-                if (near := self._near(boxes[:, box[one]], int(row[one]), float(distances[one])))
+                if (near := self.near_row(boxes[:, box[one]], int(row[one]), float(distances[one])))
             ]
 
-    def _near(self, box: Boxes, row: int, distance: float) -> Near | None:
+    def near_row(self, box: Boxes, row: int, distance: float) -> Near | None:
         """A state in a box near a row, -1 for none; None where there is none as far as is known."""
         beside = row if row >= 0 else None
         with contextlib.suppress(Unsettled):
