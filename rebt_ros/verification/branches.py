@@ -123,9 +123,15 @@ class Parted:
     """Which box of the start each one is a part of, shape (boxes,)."""
 
 
-#: How soon to go on with each of some boxes, given them and their origin: the smallest number
-#: first; infinite: not at all.
-_Order: TypeAlias = Callable[[WordArray, IntArray], FloatArray]
+@dataclass(frozen=True, eq=False, slots=True)
+class Order:
+    """In which order to split boxes, and which not at all."""
+
+    distance: Callable[[WordArray], FloatArray]
+    """Of boxes, the nearest first; no part of a box is nearer than the box."""
+    limits: FloatArray
+    """Boxes that are as far as this or farther are not gone on with, shape (boxes of the start,).
+    They may get smaller meanwhile."""
 
 
 def parted(branches: Sequence[Branch], mask: _Mask, start: WordArray, most: int) -> Parted:
@@ -151,7 +157,7 @@ def where_some_act(
     start: WordArray,
     wanted: BoolArray,
     most: int,
-    order: _Order | None = None,
+    order: Order | None = None,
 ) -> Iterator[tuple[WordArray, IntArray]]:
     """The parts of boxes in which one of some branches acts, a few at a time.
 
@@ -166,8 +172,8 @@ def where_some_act(
         wanted: Which branches are wanted in each box, at last whether it is wanted that none acts,
             shape (boxes, branches + 1).
         most: How many boxes may be split.
-        order: Tells which boxes to go on with, anew each time; by default all, those first about
-            which the least is left to be asked.
+        order: By default all boxes are gone on with, those first about which the least is left to
+            be asked.
 
     Yields:
         Parts, and which box of the start each one is a part of, shape (parts,).
@@ -301,46 +307,50 @@ class _Parting:
                 raise TooManyPartsError
             self._split(front)
 
-    def in_turn(self, start: WordArray, order: _Order | None) -> Iterator[Parted]:
+    def in_turn(self, start: WordArray, order: Order | None) -> Iterator[Parted]:
         """Splits the first boxes in an order until it is known which branch acts, then others.
 
         Raises:
             TooManyPartsError: More would have to be split than there may be.
         """
         places = np.arange(start.shape[1])
-        if order is not None and len(places):
-            soon = order(start, places)
-            places = places[np.argsort(soon, kind="stable")]
+        if order is not None:
+            places = places[np.argsort(order.distance(start), kind="stable")]
         for first in self._fronts(start, places):
-            self._answer(first)
-            yield first.decided()
-            waiting = [first] if len(first.box) else []
+            waiting: list[tuple[_Front, FloatArray]] = []
+            yield self._taken_up(first, order, waiting)
             while waiting:
-                front = waiting.pop()
-                soon = self._soon(front, order)
-                if not np.isfinite(soon).all():
-                    front.keep(np.isfinite(soon))
-                    soon = soon[np.isfinite(soon)]
+                front, soon = waiting.pop()
+                if order is not None:
+                    near = soon < order.limits[front.origin]
+                    front.keep(near)
+                    soon = soon[near]
                 if len(soon) > _SPLIT_IN_TURN:
                     later = np.ones(len(soon), dtype=bool)
                     later[np.argsort(soon, kind="stable")[:_SPLIT_IN_TURN]] = False
-                    waiting.append(front.apart(later))
+                    waiting.append((front.apart(later), soon[later]))
                 if not len(front.box):
                     continue
                 self._left -= front.boxes.shape[1]
                 if self._left < 0:
                     raise TooManyPartsError
                 self._split(front)
-                self._answer(front)
-                yield front.decided()
-                if len(front.box):
-                    waiting.append(front)
+                yield self._taken_up(front, order, waiting)
 
-    def _soon(self, front: _Front, order: _Order | None) -> FloatArray:
-        """How soon to go on with each box; see `_Order`."""
-        if order is not None:
-            return order(front.boxes[:-1], front.origin)
-        return np.bincount(front.box, minlength=front.boxes.shape[1]).astype(np.float64)
+    def _taken_up(
+        self, front: _Front, order: Order | None, waiting: list[tuple[_Front, FloatArray]]
+    ) -> Parted:
+        """Boxes about which nothing is left to be asked; the others wait."""
+        self._answer(front)
+        decided = front.decided()
+        if len(front.box):
+            soon = (
+                np.bincount(front.box, minlength=front.boxes.shape[1]).astype(np.float64)
+                if order is None
+                else order.distance(front.boxes[:-1])
+            )
+            waiting.append((front, soon))
+        return decided
 
     def _fronts(self, start: WordArray, places: IntArray) -> Iterator[_Front]:
         """The boxes of the start in some order, as many at a time as can be looked at together."""

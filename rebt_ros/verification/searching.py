@@ -14,9 +14,9 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.verification.branches import Branch, where_some_act
+from rebt_ros.verification.branches import Branch, Order, where_some_act
 from rebt_ros.verification.errors import TooManyPartsError
 from rebt_ros.verification.grid import Boxes, Grid
 from rebt_ros.verification.rules import Demand
@@ -154,15 +154,11 @@ class _Search:
             return nearest
         boxes = np.concatenate([one.boxes for one in asked], axis=1)
         rule = np.repeat(np.arange(len(asked)), [one.boxes.shape[1] for one in asked])
-        limits = np.array([one.distance for one in known])
-        rows_near = self.finder.near(boxes, limits[rule])
+        limits = np.array([one.distance for one in known])[rule]
+        rows_near = self.finder.near(boxes, limits)
         if rows_near is None:
             return nearest
-
-        def order(parts: Boxes, origin: IntArray) -> FloatArray:
-            away = rows_near.closest(parts)[0]
-            return np.where(away < limits[rule[origin]], away, np.inf)
-
+        order = Order(lambda parts: rows_near.closest(parts)[0], limits)
         wanted = np.stack([one.wanted for one in asked])[rule]
         with contextlib.suppress(TooManyPartsError):
             for parts, origin in where_some_act(
@@ -170,15 +166,15 @@ class _Search:
             ):
                 distances, rows = self.finder.closest(parts)
                 for place in np.argsort(distances, kind="stable").tolist():
-                    its = int(rule[origin[place]])
-                    if distances[place] >= limits[its]:
+                    if distances[place] >= limits[origin[place]]:
                         continue
                     near = self.finder.near_row(
                         parts[:, place], int(rows[place]), float(distances[place])
                     )
                     if near is not None:
+                        its = int(rule[origin[place]])
                         nearest[its] = near
-                        limits[its] = near.distance
+                        limits[rule == its] = near.distance
         return nearest
 
     def anywhere(self, asked: _Asked) -> Near | str | None:
