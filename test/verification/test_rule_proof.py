@@ -123,11 +123,15 @@ def test_what_is_searched_where_branches_overlap_is_what_is_found_by_looking_at_
         patched.setattr(branches, "_SPLIT_IN_TURN", split_in_turn)
         found = verdicts(check(learned, asked, tables), asked)
     for rule, one, other in zip(rules, known, found, strict=True):
-        assert one.answer is other.answer
+        # Of boxes that are cut otherwise, others may not be settled, where combinations are compared.
+        unsettled = Answer.UNKNOWN in (one.answer, other.answer) and (
+            rule.when.differs or _compares(tree)
+        )
+        assert one.answer is other.answer or unsettled
         if other.answer is Answer.BROKEN:
             state = _single(other.witness.point)
             assert rule.broken(state, written.commands(executable(tree), state)).all()
-            if most_nearer > 1 and not rule.when.differs and not _compares(tree):
+            if most_nearer > 1 and not unsettled and not rule.when.differs and not _compares(tree):
                 assert other.witness.distance == pytest.approx(one.witness.distance)
 
 
