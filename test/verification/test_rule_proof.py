@@ -123,7 +123,7 @@ def test_what_is_searched_where_branches_overlap_is_what_is_found_by_looking_at_
         patched.setattr(branches, "_SPLIT_IN_TURN", split_in_turn)
         found = verdicts(check(learned, asked, tables), asked)
     for rule, one, other in zip(rules, known, found, strict=True):
-        # Of boxes that are cut otherwise, others may not be settled, where combinations are compared.
+        # Boxes that are cut otherwise may not be settled where combinations are compared.
         unsettled = Answer.UNKNOWN in (one.answer, other.answer) and (
             rule.when.differs or _compares(tree)
         )
