@@ -11,15 +11,19 @@ order: each is reached only if all earlier ones failed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, in_parts
+from rebt_ros.arrays import BoolArray, WordArray, in_parts
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import States, history_columns
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.logic.conditions import Condition, Interval, Literal, Threshold
 from rebt_ros.paper.rule_trees import sequence
+
+#: Conditions in a word.
+_BITS: Final = 64
 
 
 def without_needless_conditions(
@@ -216,15 +220,35 @@ def _distinct(
     conditions: Sequence[Condition], table: DemonstrationTable, shown: BoolArray | None
 ) -> tuple[int, list[int]]:
     """The number of cells that the conditions distinguish, and the set that satisfies each."""
-    kinds = np.empty((0, -(-len(conditions) // 8)), dtype=np.uint8)
+    kinds = np.empty((0, -(-len(conditions) // _BITS)), dtype=np.uint64)
     for rows in in_parts(len(table)):
         history = history_columns(table.actions, table.previous[rows], table.last[rows])
         states = States(table.features, table.states[rows], history)
         holds = np.empty((len(states), len(conditions)), dtype=bool)
         for place, condition in enumerate(conditions):
             holds[:, place] = states.satisfy(Literal(condition))
-        packed = np.packbits(holds if shown is None else holds[shown[rows]], axis=1)
-        kinds = np.unique(np.concatenate([kinds, packed]), axis=0)
-    satisfied = np.unpackbits(kinds, axis=1, count=len(conditions))
+        kinds = _different(
+            np.concatenate([kinds, _words(holds if shown is None else holds[shown[rows]])])
+        )
+    satisfied = np.unpackbits(kinds.view(np.uint8), axis=1, count=len(conditions))
     sets = np.packbits(satisfied, axis=0, bitorder="little")
     return len(kinds), [int.from_bytes(column.tobytes(), "little") for column in sets.T]
+
+
+def _words(holds: BoolArray) -> WordArray:
+    """Rows of bits as words, shape (rows, words)."""
+    packed = np.packbits(holds, axis=1)
+    words = np.zeros((len(packed), -(-holds.shape[1] // _BITS) * 8), dtype=np.uint8)
+    words[:, : packed.shape[1]] = packed
+    return words.view(np.uint64)
+
+
+def _different(rows: WordArray) -> WordArray:
+    """Each row once."""
+    if rows.shape[1] <= 1:
+        # Numbers are sorted, or hashed, many times as fast as rows.
+        return np.unique(rows[:, 0]).reshape(-1, 1) if rows.size else rows[:1]
+    ordered = rows[np.lexsort(rows.T)]
+    first = np.ones(len(ordered), dtype=bool)
+    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    return ordered[first]

@@ -20,7 +20,7 @@ import numpy as np
 
 from rebt_ros.arrays import IntArray
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.demonstration.equal_states import codes_of_states
+from rebt_ros.demonstration.equal_states import codes_of_numbers, codes_of_states
 from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import number_of
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -207,7 +207,7 @@ def report_on(
 
 def _conflicts(situations: IntArray, chosen: IntArray) -> int:
     """Rows whose situation has several actions."""
-    _, of_row = np.unique(situations, return_inverse=True)
+    of_row = codes_of_numbers(situations)
     count = int(of_row.max()) + 1
     least, most = np.full(count, np.iinfo(np.int64).max), np.full(count, -1, dtype=np.int64)
     np.minimum.at(least, of_row, chosen)

@@ -89,8 +89,7 @@ def getter(path: CheckedPath) -> Getter:
     steps, last = list(path.steps), _text if path.kind is Primitive.TEXT else _finite
     place = next((at for at, step in enumerate(steps) if isinstance(step, Follow)), None)
     if place is None:
-        before = _chained([*_functions(steps), last])
-        return lambda message, _: cast(Value, before(message))
+        return _timeless(_chained([*_functions(steps), last]))
     follow = cast(Follow, steps[place])
     before = _chained([*_functions(steps[:place]), _finite])
     following = _Following(follow.series)
@@ -101,6 +100,11 @@ def getter(path: CheckedPath) -> Getter:
         return None if grown is None else cast(Value, after(grown))
 
     return read
+
+
+def _timeless(read: Callable[[Any], Value]) -> Getter:
+    """A getter that does not look at the time."""
+    return lambda message, _: read(message)
 
 
 class _Following:

@@ -7,8 +7,9 @@ range_min, or NaN: the sensor does not know, and the range is missing.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any, Final, Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,23 @@ def range_at(scan: Scan, index: int) -> float | None:
     return min(distance, _most(scan)) if distance >= scan.range_min else None
 
 
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """What several paths read of one scan, one after the other."""
+
+    scan: Scan | None
+    ranges: FloatArray
+    """All of them, NaN where one is missing."""
+    most: float
+    """The largest range there can be."""
+    angles: tuple[int, float, float]
+    """How many ranges, the first angle and the increment: one object while they stay the same."""
+
+
+#: The scan that was read last.
+_latest = _Read(None, np.zeros(0), math.inf, (0, 0.0, 0.0))
+
+
 class Beams:
     """Reads the ranges of some beams.
 
@@ -55,78 +73,79 @@ class Beams:
     """
 
     def __init__(self, first: float | None, last: float | None, by_angle: bool) -> None:
-        self._chosen: Callable[[Scan, int], Any]
-        if by_angle and first is not None and last is not None:
-            self._first, self._last = math.radians(first), math.radians(last)
-            self._chosen = self._between
-        else:
-            start = None if first is None else int(first)
-            stop = None if last is None or last == -1 else int(last) + 1
-            part = slice(start, stop)
-            self._chosen = lambda scan, count: part
+        self._between = (
+            (math.radians(first), math.radians(last))
+            if by_angle and first is not None and last is not None
+            else None
+        )
+        start = None if first is None else int(first)
+        stop = None if last is None or last == -1 else int(last) + 1
+        self._beams: slice | NDArray[np.intp] = slice(start, stop)
         # Scans of one sensor have the same angles as a rule.
-        self._known: tuple[int, float, float] | None = None
-        self._beams: slice | NDArray[np.intp] = slice(0)
+        self._angles: tuple[int, float, float] | None = None
 
     def ranges(self, scan: Scan) -> FloatArray:
         """The ranges, NaN where one is missing; shape (beams,)."""
-        return np.minimum(self._part(scan), _most(scan))
+        part, most = self._part(scan)
+        return np.minimum(part, most)
 
     def least(self, scan: Scan) -> float | None:
         """The smallest of the ranges; None where all are missing."""
-        part = self._part(scan)
+        part, most = self._part(scan)
         # What is missing is passed over, unless all is.
-        smallest = float(np.fmin.reduce(part)) if part.size else math.nan
-        return min(smallest, _most(scan)) if smallest == smallest else None
+        smallest = float(_fmin(part)) if part.size else math.nan
+        return (smallest if smallest < most else most) if smallest == smallest else None
 
     def largest(self, scan: Scan) -> float | None:
         """The largest of the ranges; None where all are missing."""
-        part = self._part(scan)
-        largest = float(np.fmax.reduce(part)) if part.size else math.nan
-        return min(largest, _most(scan)) if largest == largest else None
+        part, most = self._part(scan)
+        largest = float(_fmax(part)) if part.size else math.nan
+        return (largest if largest < most else most) if largest == largest else None
 
     def mean(self, scan: Scan) -> float | None:
         """The mean of the ranges; None where all are missing."""
-        part = self._part(scan)
+        part, most = self._part(scan)
         there = part[part == part]
         if not there.size:
             return None
-        return float(np.minimum(there, _most(scan)).mean(dtype=np.float64))
+        return float(np.minimum(there, most).mean(dtype=np.float64))
 
-    def _part(self, scan: Scan) -> FloatArray:
-        """The ranges of the beams as they are in the message, NaN where they are missing."""
-        known = _known(scan)
-        part: FloatArray = known[self._chosen(scan, len(known))]
-        return part
+    def _part(self, scan: Scan) -> tuple[FloatArray, float]:
+        """The ranges of the beams as they are in the message, NaN where they are missing.
 
-    def _between(self, scan: Scan, count: int) -> slice | NDArray[np.intp]:
-        """The beams between two angles."""
-        key = (count, scan.angle_min, scan.angle_increment)
-        if key != self._known:
-            self._known = key
-            self._beams = _between(self._first, self._last, *key)
-        return self._beams
+        With the largest range there can be.
+        """
+        read = _latest
+        if read.scan is not scan:
+            read = _newly_read(scan)
+        if self._angles is not read.angles:
+            self._angles = read.angles
+            if self._between is not None:
+                first, last = self._between
+                self._beams = _between(first, last, *read.angles)
+        return read.ranges[self._beams], read.most
 
 
 _MISSING: Final = np.float32(math.nan)
-
-#: The scan that was read last, with its known ranges: several paths read one after the other.
-_latest: tuple[Scan | None, FloatArray] = (None, np.zeros(0))
+_fmin, _fmax = np.fmin.reduce, np.fmax.reduce
 
 
-def _known(scan: Scan) -> FloatArray:
-    """All ranges, NaN where they are missing."""
+def _newly_read(scan: Scan) -> _Read:
+    """Reads a scan."""
     global _latest
-    latest, known = _latest
-    if latest is not scan:
-        ranges = np.asarray(scan.ranges)
-        # Not true of NaN.
-        there = ranges >= scan.range_min
-        if _most(scan) == math.inf:
-            there &= ranges < math.inf
-        known = np.where(there, ranges, _MISSING)
-        _latest = (scan, known)
-    return known
+    ranges, most = np.asarray(scan.ranges), _most(scan)
+    # Not true of NaN.
+    there = ranges >= scan.range_min
+    if most == math.inf:
+        there &= ranges < math.inf
+    angles = (len(ranges), scan.angle_min, scan.angle_increment)
+    _latest = _Read(
+        scan,
+        np.where(there, ranges, _MISSING),
+        most,
+        _latest.angles if _latest.angles == angles else angles,
+    )
+    return _latest
 
 
 def _most(scan: Scan) -> float:

@@ -11,13 +11,13 @@ from typing import Any, TypeAlias
 from rebt_ros.demonstration.builder import LARGEST_VALUE, StateTopic
 from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.schema import Feature, FeatureKind
-from rebt_ros.message_path.compiling import Getter, Value, attribute_of, getter
+from rebt_ros.message_path.compiling import Getter, attribute_of, getter
 from rebt_ros.message_path.definition import Primitive
 from rebt_ros.robot_file.binding import BoundFeature, BoundTopic
 from rebt_ros.robot_file.robot_file import RobotFile
 
 #: Turns what a path gives into what a row holds, NaN for what is missing.
-_Encoder: TypeAlias = Callable[[Value], float]
+_Encoder: TypeAlias = Callable[[float | str], float]
 
 
 class FeatureReader:
@@ -83,7 +83,7 @@ def state_topics_of(robot: RobotFile) -> tuple[StateTopic, ...]:
 
 def _encoder(feature: BoundFeature, categories: dict[str, Categories]) -> _Encoder:
     if feature.kind is FeatureKind.NUMERIC:
-        return lambda value: float(value) if value is not None else math.nan
+        return float
     if feature.kind is FeatureKind.BINARY:
         return lambda value: float(value) if value in (0.0, 1.0) else math.nan
     known = categories.setdefault(
@@ -96,13 +96,13 @@ def _encoder(feature: BoundFeature, categories: dict[str, Categories]) -> _Encod
     return lambda value: known.code(names.get(as_text(value), ""))
 
 
-def _text_of(feature: BoundFeature) -> Callable[[Value], str]:
+def _text_of(feature: BoundFeature) -> Callable[[float | str], str]:
     """How a value is written as a category."""
     if feature.path.kind is Primitive.TEXT:
         return str
     if feature.path.kind is Primitive.TRUTH:
         return lambda value: "true" if value else "false"
-    return lambda value: str(int(value)) if value is not None else ""
+    return lambda value: str(int(value))
 
 
 def described(

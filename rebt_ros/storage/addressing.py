@@ -6,6 +6,7 @@ import glob
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
@@ -27,7 +28,11 @@ class Demonstrations:
     def __init__(self, names: Sequence[str], paths: Sequence[Path]) -> None:
         self._names = tuple(names)
         self._paths = tuple(paths)
-        self._resolved = [path.resolve() for path in paths]
+
+    @cached_property
+    def _resolved(self) -> list[Path]:
+        # To resolve thousands takes a second, and hardly anybody asks for it.
+        return [path.resolve() for path in self._paths]
 
     def meant(self, address: str) -> tuple[int, ...]:
         """Which demonstrations an address means.

@@ -37,6 +37,7 @@ _FIXED: Final[Mapping[str, tuple[str, str]]] = {
     "float64": ("d", "f8"),
 }
 _ORDERS: Final = {b"\0\1": "<", b"\0\0": ">"}
+_LENGTHS: Final = {order: struct.Struct(f"{order}I") for order in _ORDERS.values()}
 _HEAD: Final = 4
 
 
@@ -136,8 +137,8 @@ class _Texts:
 class _Numbers:
     """A sequence of values of fixed size."""
 
-    kind: str
-    """For numpy."""
+    kinds: Mapping[str, np.dtype[Any]]
+    """By the order of bytes."""
     size: int
     wanted: bool
 
@@ -150,10 +151,9 @@ class _Numbers:
         if end + _HEAD > len(data):
             raise ValueError("a sequence is longer than its message")
         if self.wanted:
-            kind = np.dtype(f"{order}{self.kind}")
             # There may be nothing behind the length of an empty one.
             start = _HEAD + place if count else 0
-            into.append(np.frombuffer(data, dtype=kind, count=count, offset=start))
+            into.append(np.frombuffer(data, self.kinds[order], count, start))
         return end
 
 
@@ -191,7 +191,7 @@ _Part: TypeAlias = _Stretch | _Text | _Texts | _Numbers | _Records
 def _length(data: bytes, place: int, order: str) -> tuple[int, int]:
     """Where what has a length begins, and the length."""
     place += -place % 4
-    (length,) = struct.unpack_from(f"{order}I", data, _HEAD + place)
+    (length,) = _LENGTHS[order].unpack_from(data, _HEAD + place)
     return place + 4, length
 
 
@@ -253,7 +253,8 @@ class PartialDecoder:
             raise NotImplementedError(f"{element} is not read here")
         elif node == Nodetype.SEQUENCE:
             code, kind = _FIXED[name]
-            self._parts.append(_Numbers(kind, struct.calcsize(f"={code}"), wanted))
+            kinds = {order: np.dtype(f"{order}{kind}") for order in _ORDERS.values()}
+            self._parts.append(_Numbers(kinds, struct.calcsize(f"={code}"), wanted))
         else:
             if not self._parts or not isinstance(self._parts[-1], _Stretch):
                 self._parts.append(_Stretch())
@@ -275,14 +276,21 @@ def _leaves(
             yield here, node, about
 
 
-def _builder(names: Sequence[Attributes]) -> Callable[[Sequence[Any]], SimpleNamespace]:
-    """What makes an object of values, by the attributes that lead to each."""
+def _builder(
+    names: Sequence[Attributes], first_place: int = 0
+) -> Callable[[Sequence[Any]], SimpleNamespace]:
+    """What makes an object of values, by the attributes that lead to each.
+
+    Args:
+        names: The attributes, in the order of the values.
+        first_place: Where the first of them is among all values.
+    """
     within: dict[str, list[tuple[int, Attributes]]] = {}
-    for place, (first, *rest) in enumerate(names):
+    for place, (first, *rest) in enumerate(names, first_place):
         within.setdefault(first, []).append((place, tuple(rest)))
     plain = [(name, found[0][0]) for name, found in within.items() if found == [(found[0][0], ())]]
     nested = [
-        (name, found[0][0], found[-1][0] + 1, _builder([rest for _, rest in found]))
+        (name, _builder([rest for _, rest in found], found[0][0]))
         for name, found in within.items()
         if found != [(found[0][0], ())]
     ]
@@ -292,8 +300,8 @@ def _builder(names: Sequence[Attributes]) -> Callable[[Sequence[Any]], SimpleNam
         attributes = made.__dict__
         for name, place in plain:
             attributes[name] = values[place]
-        for name, start, stop, inner in nested:
-            attributes[name] = inner(values[start:stop])
+        for name, inner in nested:
+            attributes[name] = inner(values)
         return made
 
     return build

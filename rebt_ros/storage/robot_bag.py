@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder
 from rebt_ros.demonstration.categories import Categories
@@ -15,6 +15,7 @@ from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.errors import InputError
 from rebt_ros.robot_file.binding import BoundTopic, bind
 from rebt_ros.robot_file.features import FeatureReader, described, state_topics_of
+from rebt_ros.robot_file.labelling import Labeller
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.bag import (
     LATEST,
@@ -98,6 +99,15 @@ def read_robot_bag(
         return replace(feed.read(bag, set(wanted), shown), robot=robot)
 
 
+#: What the robot file calls a topic, and what decodes its messages and takes them.
+_Taking: TypeAlias = tuple[
+    str,
+    Callable[[bytes], object],
+    tuple[tuple[str, Labeller], ...],
+    FeatureReader | None,
+]
+
+
 @dataclass(slots=True, kw_only=True)
 class _RobotFeed(Feed):
     """Reads messages of any type."""
@@ -107,6 +117,18 @@ class _RobotFeed(Feed):
     readers: dict[str, FeatureReader] = field(default_factory=dict)
     unstamped: Counter[str] = field(default_factory=Counter)
     """Messages whose headers should tell their times and do not, by topic."""
+    _taking: dict[Topic, _Taking] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._taking = {
+            topic: (
+                one.name,
+                self.decoders[topic],
+                tuple(one.labellers.items()),
+                self.readers.get(one.name),
+            )
+            for topic, one in self.topics.items()
+        }
 
     def notes(self) -> tuple[str, ...]:
         """What a person should know; see `Feed.notes`."""
@@ -134,24 +156,24 @@ class _RobotFeed(Feed):
         """The rows that a message completes; see `Feed.pushed`."""
         if stamp >= LATEST:
             raise LateError
-        bound, data = self.topics[topic], unpacked(data)
+        name, decode, labellers, reader = self._taking[topic]
+        data = unpacked(data)
         try:
-            message = self.decoders[topic](data)
+            message = decode(data)
         except Exception as err:  # whatever the generated decoders meet
             raise UndecodableError from err
         rows: list[Row] = []
         refused: BadMessageError | None = None
         # What is done follows from what was there before this message.
-        for channel, labeller in bound.labellers.items():
+        for channel, labeller in labellers:
             for label in labeller.labels(message, stamp):
                 try:
                     rows += self.builder.act(stamp, channel, label)
                 except BadMessageError as err:
                     refused = err
-        reader = self.readers.get(bound.name)
         if reader is not None:
             # The state is there whatever becomes of the action.
-            rows += self.builder.observe(stamp, bound.name, reader.read(message, stamp))
+            rows += self.builder.observe(stamp, name, reader.read(message, stamp))
         if refused is not None and not (rows and self.skip_bad):
             raise refused
         return tuple(rows)

@@ -254,8 +254,15 @@ def _kind_of(file: Path) -> InputKind:
 
 def _check_distinct(paths: Sequence[Path]) -> None:
     seen: set[Path] = set()
+    directories: dict[Path, Path] = {}
     for path in paths:
-        place = path.resolve()
+        if path.is_symlink() or path.name in ("", ".."):
+            place = path.resolve()
+        else:
+            # What leads to the files of one directory is looked at once.
+            if path.parent not in directories:
+                directories[path.parent] = path.parent.resolve()
+            place = directories[path.parent] / path.name
         if place in seen:
             raise InputError(f"{path} is given twice: name every demonstration once.")
         seen.add(place)

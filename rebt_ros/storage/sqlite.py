@@ -35,6 +35,11 @@ _STEPS: Final = 1_000_000
 _STEPS_AT_ONCE: Final = 10_000
 _LEAST_LENGTH: Final = 1 << 16
 
+#: What a page may hold beside the data of a row (bytes): what is reserved on it, the page's own
+#: and the row's head, and its numbers.
+_BESIDE_DATA: Final = 400
+_ROWS_AT_ONCE: Final = 4096
+
 _JOURNAL: Final = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
 _LOG_HEAD: Final = 32
 _FRAME_HEAD: Final = 24
@@ -64,6 +69,10 @@ class SqliteFile:
     """Whether it is read page by page."""
     set_back: bool = False
     """Whether the clock was set back between messages that were read."""
+    _in_order: bool = False
+    """Whether the messages stand by their stamps, which are integers."""
+    _long: set[int] = field(default_factory=set)
+    """Topics with messages that may go on on pages which `survey` does not read."""
 
     @property
     def undeclared(self) -> int:
@@ -93,12 +102,17 @@ class SqliteFile:
 
         Among them are messages of the topic `GAP` where others are missing.
         """
+        was_given = False
         if not self.is_damaged:
             try:
-                # Damage is found before the first one is given.
-                yield from self._by_sqlite(numbers)
+                for message in self._by_sqlite(numbers):
+                    was_given = True
+                    yield message
             except sqlite3.DatabaseError as err:
                 _refuse_interrupted(err)
+                if was_given:
+                    # Damage is found before the first one is given, unless it came since then.
+                    raise
                 self._survey_pages(str(err))
             else:
                 return
@@ -148,11 +162,7 @@ class SqliteFile:
             self._survey_pages("it ends before its end")
             return
         try:
-            # An index may be damaged where the table is not.
-            counts = connection.execute(
-                "SELECT topic_id, count(*) FROM messages NOT INDEXED GROUP BY topic_id"
-            )
-            self.found.update({_number(number): int(count) for number, count in counts})
+            self._survey_messages(connection)
             [(highest,)] = connection.execute("SELECT max(id) FROM messages NOT INDEXED")
             if isinstance(highest, int) and highest > (count := self.found.total()):
                 # Recorders number messages from 1.
@@ -164,21 +174,41 @@ class SqliteFile:
             _refuse_interrupted(err)
             self._survey_pages(str(err))
 
+    def _survey_messages(self, connection: sqlite3.Connection) -> None:
+        """Counts the messages, and notes whether they can be given as they stand."""
+        [(page,)] = connection.execute("PRAGMA page_size")
+        # An index may be damaged where the table is not.
+        rows = connection.execute(
+            "SELECT topic_id, timestamp, length(data) > ? FROM messages NOT INDEXED ORDER BY id",
+            (int(page) - _BESIDE_DATA,),
+        )
+        kinds: Counter[tuple[object, object]] = Counter()
+        self._in_order, last = True, -(1 << 63)
+        while some := rows.fetchmany(_ROWS_AT_ONCE):
+            numbers, stamps, are_long = zip(*some, strict=True)
+            kinds.update(zip(numbers, are_long, strict=True))
+            if self._in_order:
+                told = set(map(type, stamps)) == {int}
+                self._in_order = told and stamps[0] >= last and stamps == (*sorted(stamps),)
+                last = stamps[-1]
+        for (number, is_long), count in kinds.items():
+            self.found[_number(number)] += count
+            if is_long:
+                self._long.add(_number(number))
+
     def _by_sqlite(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         of_topics = f"FROM messages NOT INDEXED WHERE topic_id IN ({', '.join('?' * len(numbers))})"
         with contextlib.closing(_connected(self.path)) as connection:
-            # With their data, so that damage is found before the first message is given.
-            rows = connection.execute(
-                f"SELECT topic_id, timestamp, data {of_topics} ORDER BY id", tuple(numbers)
-            )
-            stamps = [(number, stamp) for number, stamp, _ in rows]
-            told = [one for one in stamps if isinstance(one[1], int)]
-            all_told = len(told) == len(stamps)
-            places = set(set_back(told)) if all_told else set()
-            self.set_back |= bool(places)
-            sorted_already = all_told and all(one[1] <= other[1] for one, other in pairwise(told))
-            # To sort them takes SQLite as long as to read them several times.
-            order = "id" if places or sorted_already else "timestamp, id"
+            if not self._long.isdisjoint(numbers):
+                # With their data, so that damage is found before the first message is given.
+                whole = f"SELECT count(*) {of_topics} AND data IS x''"
+                connection.execute(whole, tuple(numbers)).fetchall()
+            places, order = set[int](), "id"
+            if not self._in_order:
+                stamps = connection.execute(
+                    f"SELECT topic_id, timestamp {of_topics} ORDER BY id", tuple(numbers)
+                ).fetchall()
+                places, order = self._order_of(stamps)
             messages: Iterable[tuple[int, int, bytes]] = connection.execute(
                 f"SELECT topic_id, timestamp, data {of_topics} ORDER BY {order}", tuple(numbers)
             )
@@ -188,6 +218,16 @@ class SqliteFile:
                 # A number or a text there is no message; `bytes` would make one of as many zeros.
                 usable = isinstance(data, bytes) and isinstance(stamp, int)
                 yield int(number), stamp if usable else 0, data if usable else b""
+
+    def _order_of(self, stamps: list[tuple[int, int]]) -> tuple[set[int], str]:
+        """Before which messages the clock was set back, and by what they are to be ordered."""
+        told = [one for one in stamps if isinstance(one[1], int)]
+        all_told = len(told) == len(stamps)
+        places = set(set_back(told)) if all_told else set()
+        self.set_back |= bool(places)
+        in_order = all_told and all(one[1] <= other[1] for one, other in pairwise(told))
+        # To sort them takes SQLite as long as to read them several times.
+        return places, "id" if places or in_order else "timestamp, id"
 
     def _survey_pages(self, why: str) -> None:
         """Counts the messages on pages, as SQLite cannot read all of them."""

@@ -11,12 +11,12 @@ which branch is the first: much like the decision tree that the branches came fr
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, TypeAlias
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, IntArray, WordArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray, WordArray
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.logic.conditions import Condition, Literal
 from rebt_ros.verification.errors import TooManyPartsError
@@ -25,6 +25,9 @@ from rebt_ros.verification.errors import TooManyPartsError
 _MOST_LITERALS: Final = 400_000
 #: Boxes times literals that are looked at together.
 _QUESTIONS_AT_A_TIME: Final = 2_000_000
+
+#: Boxes that are split together where the first parts are wanted soon.
+_SPLIT_IN_TURN: Final = 256
 
 #: How many times as many counters as questions it is quicker to have than to sort the questions.
 _SPARSE: Final = 4
@@ -120,8 +123,15 @@ class Parted:
     """Which box of the start each one is a part of, shape (boxes,)."""
 
 
-#: Which of the boxes that are left are worth going on with, given them and their origin.
-_Worth: TypeAlias = Callable[[WordArray, IntArray], BoolArray]
+@dataclass(frozen=True, eq=False, slots=True)
+class Order:
+    """In which order to split boxes, and which not at all."""
+
+    distance: Callable[[WordArray], FloatArray]
+    """Of boxes, the nearest first; no part of a box is nearer than the box."""
+    limits: FloatArray
+    """Boxes that are as far as this or farther are not gone on with, shape (boxes of the start,).
+    They may get smaller meanwhile."""
 
 
 def parted(branches: Sequence[Branch], mask: _Mask, start: WordArray, most: int) -> Parted:
@@ -147,12 +157,13 @@ def where_some_act(
     start: WordArray,
     wanted: BoolArray,
     most: int,
-    worth: _Worth | None = None,
-) -> tuple[WordArray, IntArray]:
-    """The parts of boxes in which one of some branches acts.
+    order: Order | None = None,
+) -> Iterator[tuple[WordArray, IntArray]]:
+    """The parts of boxes in which one of some branches acts, a few at a time.
 
     Nothing is asked that only tells wanted branches, or only unwanted ones, from each other: where
-    branches overlap, these are far fewer parts than those that `parted` finds.
+    branches overlap, these are far fewer parts than those that `parted` finds.  Few boxes are split
+    up at a time, so that the first parts are there long before the last ones.
 
     Args:
         branches: In their order.
@@ -160,18 +171,21 @@ def where_some_act(
         start: The boxes, shape (words, boxes).
         wanted: Which branches are wanted in each box, at last whether it is wanted that none acts,
             shape (boxes, branches + 1).
-        most: How many parts there may be, also unwanted ones.
-        worth: Tells which boxes to go on with; all by default.
+        most: How many boxes may be split.
+        order: By default all boxes are gone on with, those first about which the least is left to
+            be asked.
 
-    Returns:
-        The parts, and which box of the start each one is a part of, shape (parts,).
+    Yields:
+        Parts, and which box of the start each one is a part of, shape (parts,).
 
     Raises:
-        TooManyPartsError: There would be more.
+        TooManyPartsError: More would have to be split.
     """
-    found = _Parting(branches, mask, wanted.astype(np.int64), most, worth).run(start)
-    there = wanted[found.origin, found.acting]
-    return found.boxes[:, there], found.origin[there]
+    parting = _Parting(branches, mask, wanted.astype(np.int64), most)
+    for found in parting.in_turn(start, order):
+        there = wanted[found.origin, found.acting]
+        if there.any():
+            yield found.boxes[:, there], found.origin[there]
 
 
 @dataclass(eq=False, slots=True)
@@ -215,6 +229,13 @@ class _Front:
         self.boxes, self.best = self.boxes[:, kept], self.best[kept]
         self.origin = self.origin[kept]
 
+    def apart(self, others: BoolArray) -> _Front:
+        """Gives up some boxes, and returns them by themselves."""
+        front = replace(self)
+        front.keep(others)
+        self.keep(~others)
+        return front
+
 
 class _Parting:
     """Splits boxes.
@@ -224,21 +245,12 @@ class _Parting:
         mask: As for `parted`.
         kinds: Of each box of the start a number for each branch, at last for none: those with the
             same one need not be told from each other, shape (boxes, branches + 1).
-        most: How many parts there may be.
-        worth: Tells which boxes to go on with; all by default.
+        most: How many parts there may be, or boxes be split in turn.
     """
 
-    def __init__(
-        self,
-        branches: Sequence[Branch],
-        mask: _Mask,
-        kinds: IntArray,
-        most: int,
-        worth: _Worth | None = None,
-    ) -> None:
+    def __init__(self, branches: Sequence[Branch], mask: _Mask, kinds: IntArray, most: int) -> None:
         self._kinds = kinds
         self._left = most
-        self._worth = worth
         self._none = len(branches)
         # Of literals: the condition, and whether it has to hold.
         number: dict[Condition, int] = {}
@@ -272,10 +284,9 @@ class _Parting:
         Raises:
             TooManyPartsError: They fall into more parts than there may be.
         """
-        at_a_time = max(1, _QUESTIONS_AT_A_TIME // max(1, len(self._term)))
         done: list[Parted] = []
-        for first in range(0, max(1, start.shape[1]), at_a_time):
-            done += self._split_up(self._front(start[:, first : first + at_a_time], first))
+        for front in self._fronts(start, np.arange(start.shape[1])):
+            done += self._split_up(front)
         return Parted(
             np.concatenate([part.boxes for part in done], axis=1),
             np.concatenate([part.acting for part in done]),
@@ -288,23 +299,74 @@ class _Parting:
             self._answer(front)
             decided = front.decided()
             yield decided
-            if self._worth is not None and len(front.box):
-                front.keep(self._worth(front.boxes[:-1], front.origin))
             if not len(front.box):
                 return
             self._left -= decided.boxes.shape[1]
-            if front.boxes.shape[1] > self._left:
+            # Each is split in two.
+            if 2 * front.boxes.shape[1] > self._left:
                 raise TooManyPartsError
             self._split(front)
 
-    def _front(self, start: WordArray, first: int) -> _Front:
+    def in_turn(self, start: WordArray, order: Order | None) -> Iterator[Parted]:
+        """Splits the first boxes in an order until it is known which branch acts, then others.
+
+        Raises:
+            TooManyPartsError: More would have to be split than there may be.
+        """
+        places = np.arange(start.shape[1])
+        if order is not None:
+            places = places[np.argsort(order.distance(start), kind="stable")]
+        for first in self._fronts(start, places):
+            waiting: list[tuple[_Front, FloatArray]] = []
+            yield self._taken_up(first, order, waiting)
+            while waiting:
+                front, soon = waiting.pop()
+                if order is not None:
+                    near = soon < order.limits[front.origin]
+                    front.keep(near)
+                    soon = soon[near]
+                if len(soon) > _SPLIT_IN_TURN:
+                    later = np.ones(len(soon), dtype=bool)
+                    later[np.argsort(soon, kind="stable")[:_SPLIT_IN_TURN]] = False
+                    waiting.append((front.apart(later), soon[later]))
+                if not len(front.box):
+                    continue
+                self._left -= front.boxes.shape[1]
+                if self._left < 0:
+                    raise TooManyPartsError
+                self._split(front)
+                yield self._taken_up(front, order, waiting)
+
+    def _taken_up(
+        self, front: _Front, order: Order | None, waiting: list[tuple[_Front, FloatArray]]
+    ) -> Parted:
+        """Boxes about which nothing is left to be asked; the others wait."""
+        self._answer(front)
+        decided = front.decided()
+        if len(front.box):
+            soon = (
+                np.bincount(front.box, minlength=front.boxes.shape[1]).astype(np.float64)
+                if order is None
+                else order.distance(front.boxes[:-1])
+            )
+            waiting.append((front, soon))
+        return decided
+
+    def _fronts(self, start: WordArray, places: IntArray) -> Iterator[_Front]:
+        """The boxes of the start in some order, as many at a time as can be looked at together."""
+        at_a_time = max(1, _QUESTIONS_AT_A_TIME // max(1, len(self._term)))
+        for first in range(0, max(1, len(places)), at_a_time):
+            some = places[first : first + at_a_time]
+            yield self._front(start[:, some], some)
+
+    def _front(self, start: WordArray, origin: IntArray) -> _Front:
         """Boxes with all questions there are."""
         count, terms = start.shape[1], len(self._rank)
         boxes = np.arange(count)
         return _Front(
             np.concatenate([start, np.zeros((1, count), dtype=np.uint64)]),
             np.full(count, self._none),
-            boxes + first,
+            origin,
             np.repeat(boxes, terms),
             np.tile(np.arange(terms), count),
             (boxes[:, np.newaxis] * terms + self._term).reshape(-1),

@@ -55,7 +55,8 @@ LARGEST: Final = sys.float_info.max
 #: Stands for every action that no condition names.
 ANOTHER_ACTION: Final = "another action"
 
-_BITS: Final = 64
+#: Cells in a word.
+BITS: Final = 64
 #: Most histories that are told apart.
 _MOST_HISTORIES: Final = 100_000
 #: Most boxes of the condition of a rule.
@@ -102,7 +103,7 @@ class Field:
 
     def chosen(self, cells: BoolArray) -> Boxes:
         """The words of some of its cells, shape (words,)."""
-        bits = np.zeros((self.words.stop - self.words.start) * _BITS, dtype=bool)
+        bits = np.zeros((self.words.stop - self.words.start) * BITS, dtype=bool)
         bits[: self.cells] = cells
         return np.packbits(bits, bitorder="little").view(np.uint64)
 
@@ -315,7 +316,7 @@ def _before(value: float) -> float:
 
 
 def _words(cells: int) -> int:
-    return max(1, -(-cells // _BITS))
+    return max(1, -(-cells // BITS))
 
 
 def _histories(conditions: Sequence[HistoryCondition]) -> tuple[HistoryCell, ...]:

@@ -7,27 +7,30 @@ breaks the rule, and then only what is nearer remains to be looked at.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, IntArray
+from rebt_ros.arrays import BoolArray
 from rebt_ros.behavior_tree import nodes
-from rebt_ros.verification.branches import Branch, where_some_act
+from rebt_ros.verification.branches import Branch, Order, where_some_act
 from rebt_ros.verification.errors import TooManyPartsError
 from rebt_ros.verification.grid import Boxes, Grid
 from rebt_ros.verification.rules import Demand
 from rebt_ros.verification.states import Near, Point, StateFinder, Unsettled
 
-#: Into how many parts the states may fall that are nearer to what was shown than a known one.
+#: How many boxes may be split to find states that are nearer to what was shown than known ones.
 _MOST_NEARER: Final = 20_000
-#: ... and those that a rule is about.
+#: ... and to find any state that breaks a rule.
 _MOST_ASKED: Final = 50_000
-#: Beside how many rows it is tried whether a state breaks a rule, at a time and in all.
-_TRIED_AT_A_TIME: Final = 8
-_MOST_TRIED: Final = 64
+#: ... and to find all such states.
+_MOST_LISTED: Final = 1_000
+#: Beside how many rows it is tried whether a state breaks a rule, one time after the other: mostly
+#: the first one does.
+_TRIED: Final = (1, 4, 24)
 
 #: What a tree commands in each of some states.
 _Commands: TypeAlias = Callable[[Sequence[Point]], Sequence[nodes.Action | None]]
@@ -86,17 +89,16 @@ def searched(
     """
     search = _Search(branches, grid, finder)
     asked = [_Asked.of(one, grid, leaves) for one in demands]
-    beside = [_beside_rows(one, finder, commands) for one in asked]
-    nearer = iter(
-        search.nearer(
-            [one for one, near in zip(asked, beside, strict=True) if near],
-            [near.distance for near in beside if near],
-        )
-    )
-    return [
-        search.anywhere(one) if near is None else Broken(next(nearer) or near, None)
-        for one, near in zip(asked, beside, strict=True)
-    ]
+    found: list[Near | str | None] = [*_beside_rows(asked, finder, commands)]
+    regions: list[Boxes | None] = [None] * len(found)
+    for place, one in enumerate(asked):
+        if found[place] is None:
+            found[place], regions[place] = search.anywhere(one), search.everywhere(one)
+    known = {place: near for place, near in enumerate(found) if isinstance(near, Near)}
+    nearer = search.nearer([asked[place] for place in known], [*known.values()])
+    for place, near in zip(known, nearer, strict=True):
+        found[place] = near
+    return [Broken(near, region) for near, region in zip(found, regions, strict=True)]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -117,19 +119,22 @@ class _Asked:
         return cls(demand, grid.boxes(demand.region), wanted)
 
 
-def _beside_rows(asked: _Asked, finder: StateFinder, commands: _Commands) -> Near | None:
-    """A state that breaks a rule, of those nearest to each row in the region of the rule."""
-    forbidden = asked.demand.forbids is not None
-    tried = 0
-    for some in finder.beside(asked.boxes, _TRIED_AT_A_TIME):
-        of_each = commands([near.point for near in some])
-        for near, command in zip(some, of_each, strict=True):
-            if (command == asked.demand.action) is forbidden:
-                return near
-        tried += _TRIED_AT_A_TIME
-        if tried >= _MOST_TRIED:
-            break
-    return None
+def _beside_rows(
+    asked: Sequence[_Asked], finder: StateFinder, commands: _Commands
+) -> list[Near | None]:
+    """Of each rule, a state that breaks it, of those nearest to each row in its region."""
+    found: list[Near | None] = [None] * len(asked)
+    left = dict(enumerate(finder.beside([one.boxes for one in asked], _TRIED)))
+    for _ in _TRIED:
+        tried = [(place, near) for place, its in left.items() for near in next(its, ())]
+        # All at once: a tree is asked about many states in little more time than about one.
+        of_each = commands([near.point for _, near in tried])
+        for (place, near), command in zip(tried, of_each, strict=True):
+            forbidden = asked[place].demand.forbids is not None
+            if place in left and (command == asked[place].demand.action) is forbidden:
+                found[place] = near
+                del left[place]
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,45 +143,64 @@ class _Search:
     grid: Grid
     finder: StateFinder
 
-    def nearer(self, asked: Sequence[_Asked], distances: Sequence[float]) -> list[Near | None]:
-        """Of each rule, a state that breaks it and is nearer to what was shown than a distance.
+    def nearer(self, asked: Sequence[_Asked], known: Sequence[Near]) -> list[Near]:
+        """Of each rule, a state that breaks it and is nearer to what was shown than a known one.
 
         Returns:
-            The nearest ones; None where there is none, as far as could be found out.
+            The nearest ones, as far as could be found out; the known ones where there are none.
         """
+        nearest = [*known]
         if not asked:
-            return []
+            return nearest
         boxes = np.concatenate([one.boxes for one in asked], axis=1)
         rule = np.repeat(np.arange(len(asked)), [one.boxes.shape[1] for one in asked])
-        limits = np.array(distances)[rule]
+        limits = np.array([one.distance for one in known])[rule]
         rows_near = self.finder.near(boxes, limits)
         if rows_near is None:
-            return [None] * len(asked)
-
-        def is_nearer(parts: Boxes, origin: IntArray) -> BoolArray:
-            return rows_near.closest(parts)[0] < limits[origin]
-
+            return nearest
+        order = Order(lambda parts: rows_near.closest(parts)[0], limits)
         wanted = np.stack([one.wanted for one in asked])[rule]
-        try:
-            found, origin = where_some_act(
-                self.branches, self.grid.mask, boxes, wanted, _MOST_NEARER, is_nearer
-            )
-        except TooManyPartsError:
-            return [None] * len(asked)
-        regions = [found[:, rule[origin] == one] for one in range(len(asked))]
-        return [
-            one.nearest if isinstance(one.nearest, Near) and one.nearest.distance < limit else None
-            for one, limit in zip(found_in(regions, self.finder), distances, strict=True)
-        ]
+        with contextlib.suppress(TooManyPartsError):
+            for parts, origin in where_some_act(
+                self.branches, self.grid.mask, boxes, wanted, _MOST_NEARER, order
+            ):
+                distances, rows = self.finder.closest(parts)
+                for place in np.argsort(distances, kind="stable").tolist():
+                    if distances[place] >= limits[origin[place]]:
+                        continue
+                    near = self.finder.near_row(
+                        parts[:, place], int(rows[place]), float(distances[place])
+                    )
+                    if near is not None:
+                        its = int(rule[origin[place]])
+                        nearest[its] = near
+                        limits[rule == its] = near.distance
+        return nearest
 
-    def anywhere(self, asked: _Asked) -> Broken:
-        """Where a rule is broken at all."""
+    def anywhere(self, asked: _Asked) -> Near | str | None:
+        """A state that breaks a rule; None: there is none, or why that is unknown."""
+        wanted = np.tile(asked.wanted, (asked.boxes.shape[1], 1))
+        unsettled = False
+        try:
+            for parts, _ in where_some_act(
+                self.branches, self.grid.mask, asked.boxes, wanted, _MOST_ASKED
+            ):
+                try:
+                    near = self.finder.nearest(parts)
+                except Unsettled:
+                    unsettled = True
+                    continue
+                if near is not None:
+                    return near
+        except TooManyPartsError:
+            return _OVERLAPPING
+        return _UNSETTLED if unsettled else None
+
+    def everywhere(self, asked: _Asked) -> Boxes | None:
+        """All states that break a rule; None where they are too many to be listed."""
         wanted = np.tile(asked.wanted, (asked.boxes.shape[1], 1))
         try:
-            region, _ = where_some_act(
-                self.branches, self.grid.mask, asked.boxes, wanted, _MOST_ASKED
-            )
+            found = where_some_act(self.branches, self.grid.mask, asked.boxes, wanted, _MOST_LISTED)
+            return np.concatenate([self.finder.no_boxes, *(parts for parts, _ in found)], axis=1)
         except TooManyPartsError:
-            return Broken(_OVERLAPPING, None)
-        [found] = found_in([region], self.finder)
-        return found
+            return None

@@ -12,11 +12,19 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from rebt_ros.arrays import BoolArray, FloatArray, IntArray
+from rebt_ros.arrays import BoolArray, FloatArray, IntArray, WordArray
 from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.logic.conditions import Combination, Quantity, WeightedSum, features_in
-from rebt_ros.verification.grid import ANOTHER_ACTION, LARGEST, Boxes, Field, Grid, HistoryCell
+from rebt_ros.verification.grid import (
+    ANOTHER_ACTION,
+    BITS,
+    LARGEST,
+    Boxes,
+    Field,
+    Grid,
+    HistoryCell,
+)
 from rebt_ros.verification.linear_bounds import Bound, numbers_within
 from rebt_ros.verification.reference import Reference
 
@@ -73,6 +81,25 @@ class _Range:
     def ends(self) -> tuple[float, float]:
         """Both ends, infinite where there is none."""
         return self.above, self.at_most if self.at_most < LARGEST else math.inf
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Row:
+    """What was shown in a row."""
+
+    values: list[float]
+    """Of all features."""
+    words: IntArray
+    """Of each field of the grid the word with the cell of its value, shape (fields,)."""
+    bits: WordArray
+    """... and its bit there, shape (fields,)."""
+    usable: BoolArray
+    """Which fields are features with a value that can be kept, shape (fields,)."""
+
+    def lie_in(self, box: Boxes) -> BoolArray:
+        """Of which fields the value can be kept in a box, shape (fields,)."""
+        there: BoolArray = (box[self.words] >> self.bits) & np.uint64(1) != 0
+        return self.usable & there
 
 
 class Unsettled(Exception):  # noqa: N818 - an answer rather than an error
@@ -144,6 +171,8 @@ class StateFinder:
     ) -> None:
         self._movable = movable
         self._tables: dict[Quantity | None, FloatArray] = {}
+        self._all_cells = grid.everything()
+        self._known: dict[int | None, _Row] = {}
         self._grid = grid
         self._features = features
         self._shown = shown
@@ -154,7 +183,7 @@ class StateFinder:
     @property
     def no_boxes(self) -> Boxes:
         """None, of the grid."""
-        return self._grid.everything()[:, :0]
+        return self._all_cells[:, :0]
 
     def nearest(self, boxes: Boxes) -> Near | None:
         """As the function of this name."""
@@ -185,30 +214,78 @@ class StateFinder:
             raise Unsettled
         return None
 
-    def beside(self, boxes: Boxes, at_a_time: int) -> Iterator[list[Near]]:
-        """States in some boxes, each the nearest to a row, those first that are closest to theirs.
+    def beside(
+        self, regions: Sequence[Boxes], at_a_time: Sequence[int]
+    ) -> list[Iterator[list[Near]]]:
+        """States in some regions, each the nearest to a row, those first that are closest to it.
 
         Args:
-            boxes: Any number of them; of many, only the row that is nearest to each is looked at.
-            at_a_time: How many states to look for together.
+            regions: Boxes of each; of many, only the row that is nearest to each is looked at.
+            at_a_time: How many states to look for, one time after the other.
+
+        Returns:
+            Of each region, what is found each time.
         """
-        count = len(self._shown)
-        if 0 < boxes.shape[1] * count <= _COMPARED_AT_A_TIME:
-            distances = self._distances(boxes).reshape(-1)
-            box, row = np.divmod(np.arange(len(distances)), count)
+        count = max(1, len(self._shown))
+        few = [0 < one.shape[1] * len(self._shown) <= _COMPARED_AT_A_TIME for one in regions]
+        together = [one for one, its in zip(regions, few, strict=True) if its]
+        # All at once: what numpy does once per call then does not matter.
+        compared = iter(self._distances_of(together))
+        found = []
+        for boxes, its in zip(regions, few, strict=True):
+            if its:
+                distances = next(compared).reshape(-1)
+                box, row = np.divmod(np.arange(len(distances)), count)
+            else:
+                distances, row = self.closest(boxes)
+                box = np.arange(boxes.shape[1])
+            found.append(self._in_order(boxes, distances, box, row, at_a_time))
+        return found
+
+    def _distances_of(self, regions: Sequence[Boxes]) -> Iterator[FloatArray]:
+        """As `_distances`, of each region."""
+        start = 0
+        while start < len(regions):
+            size, end = 0, start
+            while end < len(regions) and (
+                end == start
+                or (size + regions[end].shape[1]) * len(self._shown) <= _COMPARED_AT_A_TIME
+            ):
+                size += regions[end].shape[1]
+                end += 1
+            some = regions[start:end]
+            ends = np.cumsum([one.shape[1] for one in some])[:-1]
+            yield from np.split(self._distances(np.concatenate(some, axis=1)), ends)
+            start = end
+
+    def _in_order(
+        self,
+        boxes: Boxes,
+        distances: FloatArray,
+        box: IntArray,
+        row: IntArray,
+        at_a_time: Sequence[int],
+    ) -> Iterator[list[Near]]:
+        """See `beside`."""
+        most = sum(at_a_time)
+        if len(distances) > most:
+            # All others are farther away, and those that are as far stand behind.
+            limit = np.partition(distances, most - 1)[most - 1]
+            nearest = np.flatnonzero(distances <= limit)
+            order = nearest[np.argsort(distances[nearest], kind="stable")]
         else:
-            distances, row = self.closest(boxes)
-            box = np.arange(boxes.shape[1])
-        order = np.argsort(distances, kind="stable")
-        for start in range(0, len(order), at_a_time):
-            places = order[start : start + at_a_time]
+            order = np.argsort(distances, kind="stable")
+        start = 0
+        for size in at_a_time:
+            places = order[start : start + size]
+            start += size
             yield [
                 near
                 for one in places
-                if (near := self._near(boxes[:, box[one]], int(row[one]), float(distances[one])))
+                if (near := self.near_row(boxes[:, box[one]], int(row[one]), float(distances[one])))
             ]
 
-    def _near(self, box: Boxes, row: int, distance: float) -> Near | None:
+    def near_row(self, box: Boxes, row: int, distance: float) -> Near | None:
         """A state in a box near a row, -1 for none; None where there is none as far as is known."""
         beside = row if row >= 0 else None
         with contextlib.suppress(Unsettled):
@@ -266,18 +343,18 @@ class StateFinder:
         for field in self._grid.fields:
             if not isinstance(field.quantity, str):
                 continue
-            # Many boxes have the same cells of a field.
             words = boxes[field.words]
+            if (words == self._all_cells[field.words]).all():
+                continue
+            # Many boxes have the same cells of a field.
             if len(words) == 1:
                 # Numbers are sorted much faster than columns.
                 different, which = np.unique(words[0], return_inverse=True)
                 different = different[np.newaxis]
             else:
                 different, which = np.unique(words, axis=1, return_inverse=True)
-            cells = field.cells_of_words(different)
-            if len(cells) == 1 and cells.all():
-                continue
             away = self._away(field)
+            cells = field.cells_of_words(different)
             least = np.array([away[:, its].min(axis=1, initial=np.inf) for its in cells])
             total += least[np.asarray(which).reshape(-1)]
         return total
@@ -311,13 +388,17 @@ class StateFinder:
         Raises:
             Unsettled: It could not be found out.
         """
-        values = [self._shown_value(column, row) for column in range(len(self._features))]
+        if row not in self._known:
+            self._known[row] = self._row(row)
+        known = self._known[row]
+        values = [*known.values]
         before: HistoryCell | None = None
-        for field in self._grid.fields:
-            cells = field.cells_of(box[:, np.newaxis])[0]
+        for place in np.flatnonzero(~known.lie_in(box)).tolist():
+            field = self._grid.fields[place]
             if field.quantity is None:
-                before = self._before(field, cells, row)
+                before = self._before(field, field.cells_of(box[:, np.newaxis])[0], row)
             elif isinstance(field.quantity, str):
+                cells = field.cells_of(box[:, np.newaxis])[0]
                 column = self._place[field.quantity]
                 values[column] = self._value(field, cells, column, values[column])
         if not self._fits(box, values):
@@ -326,6 +407,23 @@ class StateFinder:
                 return None
             values = moved
         return Point(tuple(values), before)
+
+    def _row(self, row: int | None) -> _Row:
+        """A row, made ready to be compared with boxes."""
+        values = [self._shown_value(column, row) for column in range(len(self._features))]
+        words, bits = [], []
+        usable = np.zeros(len(self._grid.fields), dtype=bool)
+        for place, field in enumerate(self._grid.fields):
+            cell = 0
+            if isinstance(field.quantity, str):
+                value = values[self._place[field.quantity]]
+                cell, usable[place] = field.cell(value), self._is_value(field, value)
+            word, bit = divmod(cell, BITS)
+            words.append(field.words.start + word)
+            bits.append(bit)
+        return _Row(
+            values, np.array(words, dtype=np.int64), np.array(bits, dtype=np.uint64), usable
+        )
 
     def _shown_value(self, column: int, row: int | None) -> float:
         if row is None:
@@ -346,9 +444,7 @@ class StateFinder:
         return min(allowed, key=lambda one: ANOTHER_ACTION in one.taken)
 
     def _value(self, field: Field, cells: BoolArray, column: int, value: float) -> float:
-        """The value in some cells that is nearest to another one."""
-        if cells[field.cell(value)] and self._is_value(field, value):
-            return value
+        """The value in some cells that is nearest to another one, which is in none of them."""
         if field.feature is not None and field.feature.kind is FeatureKind.CATEGORICAL:
             codes = np.flatnonzero(cells)
             return float(field.ends[codes[0]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from typing import Final
 
@@ -33,12 +32,24 @@ def support_of(table: DemonstrationTable, rows: IntArray) -> Support:
         table: All rows.
         rows: Their positions, ascending.
     """
-    labels = Counter(table.actions[code] for code in table.chosen[rows].tolist())
-    numbers = Counter(table.demonstration[rows].tolist())
+    labels = _most_common(table.chosen[rows])
+    numbers = table.demonstration[rows]
     named = []
-    for number, count in numbers.most_common(_NAMED):
+    for number, count in _most_common(numbers)[:_NAMED]:
         start = int(np.searchsorted(table.demonstration, number))
-        first = int(rows[np.searchsorted(table.demonstration[rows], number)])
+        first = int(rows[np.searchsorted(numbers, number)])
         seconds = float(table.stamps[first] - table.stamps[start]) / 1e9
         named.append((table.demonstrations[number], count, seconds))
-    return Support(len(rows), tuple(labels.most_common()), tuple(named))
+    named_labels = tuple((table.actions[code], count) for code, count in labels)
+    return Support(len(rows), named_labels, tuple(named))
+
+
+def _most_common(codes: IntArray) -> list[tuple[int, int]]:
+    """Each code with how often it occurs, the most frequent first, of several the first to come."""
+    counts = np.bincount(codes)
+    first = np.zeros(len(counts), dtype=np.int64)
+    # What is written last stays.
+    first[codes[::-1]] = np.arange(len(codes))[::-1]
+    there = np.flatnonzero(counts)
+    order = there[np.lexsort((first[there], -counts[there]))]
+    return list(zip(order.tolist(), counts[order].tolist(), strict=True))

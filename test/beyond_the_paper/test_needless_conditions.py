@@ -13,6 +13,7 @@ from pruned_trees import train
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import States, choose, history_columns
+from rebt_ros.beyond_the_paper import needless_conditions
 from rebt_ros.beyond_the_paper.needless_conditions import without_needless_conditions
 from rebt_ros.beyond_the_paper.priority_root import reduced_tree
 from rebt_ros.decision_tree.encoding import Vocabulary
@@ -175,3 +176,12 @@ def _with_a_condition_less(tree: nodes.Node) -> Iterator[nodes.Node]:
 
 def _only_tells(node: nodes.Node) -> bool:
     return not nodes.actions(node)
+
+
+@pytest.mark.parametrize("count", [0, 1, 63, 64, 65, 200])
+def test_rows_of_any_number_of_conditions_are_told_apart(count: int) -> None:
+    holds = np.random.default_rng(count).random((300, count)) < 0.01
+    found = needless_conditions._different(needless_conditions._words(holds))
+    bits = np.unpackbits(found.view(np.uint8), axis=1, count=count).astype(bool)
+    assert len(bits) == len({row.tobytes() for row in bits})
+    assert {row.tobytes() for row in bits} == {row.tobytes() for row in holds}

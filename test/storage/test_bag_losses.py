@@ -9,9 +9,11 @@ import shutil
 import sqlite3
 import struct
 import tempfile
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from unittest import mock
 
 import lz4.frame
 import mcap_files as mcap
@@ -24,12 +26,13 @@ from rosbags.rosbag2 import StoragePlugin
 
 from rebt_ros.demonstration.builder import StateTopic
 from rebt_ros.errors import InputError
-from rebt_ros.storage import packing
+from rebt_ros.storage import packing, sqlite
 from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.inputs import load
 from rebt_ros.storage.mcap import _records
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.sqlite_pages import SqlitePages
+from rebt_ros.storage.time_order import by_time
 
 MCAP, SQLITE = StoragePlugin.MCAP, StoragePlugin.SQLITE3
 
@@ -309,17 +312,31 @@ def test_a_file_that_cannot_be_read_does_not_keep_the_others_from_being_read(
     assert any("git lfs pull" in note for note in read.notes)
 
 
+_TABLES = (
+    "PRAGMA page_size = 512;"
+    "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, "
+    "serialization_format TEXT, offered_qos_profiles TEXT);"
+    "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, "
+    "timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
+    "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
+)
+
+
+def _database_of(path: Path, messages: list[tuple[int, int, bytes]]) -> None:
+    """A database of messages: topic, stamp and data of each."""
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        connection.executescript(_TABLES)
+        connection.executemany(
+            "INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", messages
+        )
+        connection.commit()
+
+
 def _large_database(path: Path) -> bytes:
     """A database of 400 messages, one of them longer than a page, with 100 deleted."""
     connection = sqlite3.connect(path)
     connection.executescript(
-        "PRAGMA page_size = 512;"
-        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, "
-        "serialization_format TEXT, offered_qos_profiles TEXT);"
-        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, "
-        "timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
-        "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
-        f"INSERT INTO topics VALUES (1, '/state', '{mcap.STATE}', 'cdr', ''),"
+        f"{_TABLES} INSERT INTO topics VALUES (1, '/state', '{mcap.STATE}', 'cdr', ''),"
         f" (2, '/action', '{mcap.ACTION}', 'cdr', '')"
     )
     messages = [
@@ -373,6 +390,49 @@ def test_what_a_cut_off_database_still_has_is_read(tmp_path: Path) -> None:
     [note] = [one for one in read.notes if "could be read" in one]
     assert "is damaged (it ends before its end)" in note
     assert re.search(r"\d+ of at least \d+ messages", note)
+
+
+def test_damage_behind_a_row_that_goes_on_on_other_pages_costs_that_row_alone(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "bag.db3"
+    data = bytearray(_large_database(path))
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        [(count,)] = connection.execute("SELECT count(*) FROM messages")
+    [first, *_] = (at for at in range(0, len(data), 512) if data[at + 4 : at + 512] == b"x" * 508)
+    data[first : first + 4] = b"\xff" * 4
+    path.write_bytes(data)
+    whole = tmp_path / "whole.db3"
+    _large_database(whole)
+    read, of_whole = read_bag(path), read_bag(whole)
+    assert len(of_whole.demonstration) - len(read.demonstration) == 1
+    [note] = [one for one in read.notes if "could be read" in one]
+    assert f"{count - 1} messages could be read" in note or f"{count - 1} of at least" in note
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(1, 3), st.one_of(st.integers(0, 20), st.integers(0, 10**10))),
+        max_size=30,
+    ),
+    st.booleans(),
+    st.sets(st.integers(1, 3), min_size=1),
+    st.integers(1, 9),
+)
+def test_messages_of_sqlite_are_given_by_their_stamps(
+    messages: list[tuple[int, int]], are_sorted: bool, wanted: set[int], at_once: int
+) -> None:
+    if are_sorted:
+        messages.sort(key=lambda one: one[1])
+    named = [(number, stamp, bytes([place])) for place, (number, stamp) in enumerate(messages)]
+    with tempfile.TemporaryDirectory() as directory:
+        path = Path(directory, "bag.db3")
+        _database_of(path, named)
+        with mock.patch.object(sqlite, "_ROWS_AT_ONCE", at_once), sqlite.opened(path) as file:
+            found = list(file.messages(sorted(wanted)))
+    assert file.found == Counter(number for number, _ in messages)
+    expected = [one for one in named if one[0] in wanted]
+    assert found == by_time(expected, lambda stamp: (sqlite.GAP, stamp, b""), lambda: None)
 
 
 def test_a_log_that_is_damaged_is_noted(tmp_path: Path) -> None:

@@ -211,6 +211,22 @@ def test_an_option_for_tables_needs_a_table(tmp_path, options):
         load([write_bag(tmp_path / "bag")], options)
 
 
+def test_a_demonstration_counts_once_by_whatever_path(tmp_path, monkeypatch):
+    path = write_recording(tmp_path / "recordings")
+    (tmp_path / "link").symlink_to(path)
+    (tmp_path / "directory").symlink_to(tmp_path / "recordings")
+    monkeypatch.chdir(tmp_path)
+    same = (
+        Path("link"),
+        Path("directory", path.name),
+        Path("recordings", path.name),
+        Path("recordings", "..", "recordings", path.name),
+    )
+    for other in same:
+        with pytest.raises(InputError, match="given twice"):
+            load([path, other])
+
+
 def test_a_demonstration_counts_once(tmp_path):
     path = write_recording(tmp_path / "recordings")
     with pytest.raises(InputError, match="given twice"):
