@@ -127,7 +127,7 @@ def learn(
         loaded.accounts,
         proven,
         aside=loaded.aside,
-        excluded=loaded.excluded,
+        excluded=(*loaded.excluded, *loaded.excluded_parts),
         paths=files,
         weights=weights,
     )

@@ -1,4 +1,4 @@
-"""CSV tables as demonstrations: one table is one demonstration, one row is one action.
+"""CSV tables as demonstrations: one table is one or several, one row is one action.
 
 What the cells of a column mean is told in `cells`.  Where several columns hold actions, a row is
 one event on each of their channels.
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -38,13 +39,12 @@ from rebt_ros.storage.cells import (
 )
 from rebt_ros.storage.column_names import (
     column_names,
+    counts_rows,
     label_position,
-    numbers_rows,
     of_the_actions,
-    tells_demonstrations,
-    tells_time,
 )
-from rebt_ros.storage.read import Read
+from rebt_ros.storage.episode_columns import Episodes, found_episodes, named_episodes
+from rebt_ros.storage.read import Part, Read
 from rebt_ros.storage.records import NoRow, Records, read_records
 
 #: A column of this name holds each row's stamp, in nanoseconds, and is not a feature.
@@ -66,6 +66,7 @@ def read_csv(
     row_kind: RowKind | None = None,
     features: Set[str] = frozenset(),
     channels: Sequence[str] = (),
+    episode_columns: Sequence[str] | None = None,
 ) -> Read:
     """Reads a CSV table.
 
@@ -81,6 +82,8 @@ def read_csv(
         features: Columns that are features even where their names say that they number or date the
             rows.
         channels: Label columns of a table that has all of them, where `labels` names none.
+        episode_columns: Columns that say to which demonstration a row belongs; none for a table
+            that is a single one; None to tell by names and values.
 
     Returns:
         The rows that have an action: on the channel `DEFAULT_CHANNEL` where there is one label
@@ -103,8 +106,9 @@ def read_csv(
     if row_kind is None:
         row_kind = RowKind.EVENT if outcomes else RowKind.SAMPLE
     known = outcomes if stamps is None else outcomes | {STAMP}
-    left_out = _numbering(shown, known, features, notes)
-    left_out |= _episodes(shown, known | left_out, features, notes)
+    told = _episodes(shown, episode_columns, known, features)
+    notes += told.notes
+    left_out = told.columns | _numbering(shown, told, known | told.columns, features, notes)
     read, columns, unreadable = _states(shown, known | left_out, notes)
     taken, label = shown.events()
     actions, chosen = shown.actions(taken, label)
@@ -125,6 +129,7 @@ def read_csv(
         tuple(notes),
         _account(table, len(labelled), len(taken)),
         frozenset(left_out | unreadable),
+        parts=_of_events(told.parts, taken),
     )
 
 
@@ -222,16 +227,22 @@ def _has_decimal_commas(table: _Table, columns: Sequence[Column | NoFeature]) ->
 
 
 def _numbering(
-    shown: _Shown, known: Set[str], asked_for: Set[str], notes: list[str]
+    shown: _Shown,
+    episodes: Episodes,
+    known: Set[str],
+    asked_for: Set[str],
+    notes: list[str],
 ) -> frozenset[str]:
     """The columns that number or date the rows, but for those that are known or asked for."""
     table = shown.table
-    found = {
-        name
-        for place, name in enumerate(table.columns)
-        if place not in table.labels and name not in known and name not in asked_for
-        if numbers_rows(name, shown.cells[place]) or tells_time(shown.cells[place])
-    }
+    found = set()
+    for place, name in enumerate(table.columns):
+        if place in table.labels or name in known or name in asked_for:
+            continue
+        cells = shown.cells[place]
+        ends = [*accumulate(part.rows for part in episodes.parts)] or [len(cells)]
+        if counts_rows(name, [cells[begin:end] for begin, end in pairwise((0, *ends))]):
+            found.add(name)
     for name in sorted(found):
         integers = (
             ", and does not hold integers (nanoseconds), which could tell the time"
@@ -243,25 +254,56 @@ def _numbering(
 
 
 def _episodes(
-    shown: _Shown, known: Set[str], asked_for: Set[str], notes: list[str]
-) -> frozenset[str]:
-    """The columns that say to which demonstration a row belongs."""
+    shown: _Shown, columns: Sequence[str] | None, known: Set[str], asked_for: Set[str]
+) -> Episodes:
+    """The demonstrations of a table, by the columns that tell them.
+
+    Args:
+        shown: The rows that have an action.
+        columns: The columns that somebody named; None to find them.
+        known: Columns that say something else.
+        asked_for: Columns that are features.
+
+    Raises:
+        InputError: A column that was named is not there, says something else, or does not tell.
+    """
     table = shown.table
-    found = set()
-    for place, name in enumerate(table.columns):
-        if place in table.labels or name in known or name in asked_for:
-            continue
-        if not tells_demonstrations(name, shown.cells[place]):
-            continue
-        found.add(name)
-        note = f"column {name!r} says to which demonstration a row belongs and is no feature"
-        if (count := len({cell.strip() for cell in shown.cells[place]})) > 1:
-            note += (
-                f"; its {count} are learned from as a single one, in which each seems to go on "
-                "where the one before has ended: write each to a table of its own"
+
+    def cells(place: int) -> list[str]:
+        return [row[place] for row in table.rows]
+
+    if not columns:
+        return found_episodes(
+            {
+                name: cells(place)
+                for place, name in enumerate(table.columns)
+                if place not in table.labels and name not in known and name not in asked_for
+            },
+            shown.rows,
+            split=columns is None,
+        )
+    named = {}
+    for said in columns:
+        place = label_position(table.columns, said, said=table.said)
+        if place is None:
+            raise InputError(
+                f"{table.path}: there is no column {said!r}: {_listing(table.columns)}."
             )
-        notes.append(note)
-    return frozenset(found)
+        name = table.columns[place]
+        if place in table.labels or name in known:
+            raise InputError(
+                f"{table.path}: column {name!r} holds actions, how they ended, or stamps: name "
+                "another episode column."
+            )
+        named[name] = cells(place)
+    return named_episodes(named, shown.rows, lambda row: f"{table.path}, line {table.lines[row]}")
+
+
+def _of_events(parts: Sequence[Part], taken: IntArray) -> tuple[Part, ...]:
+    """How many events the demonstrations have, of which a row may hold several."""
+    ends = np.searchsorted(taken, np.cumsum([part.rows for part in parts], dtype=np.int64))
+    counts = np.diff(ends, prepend=0).tolist()
+    return tuple(Part(part.name, count) for part, count in zip(parts, counts, strict=True))
 
 
 def _doubts(actions: Sequence[str], events: int) -> list[str]:

@@ -514,8 +514,20 @@ def test_what_says_to_which_demonstration_a_row_belongs_is_no_feature(
     read = _read(tmp_path, _written(rows, [name, "x", "a"]))
     assert [feature.name for feature in read.demonstration.features] == ["x"]
     [note] = read.notes
-    assert "says to which demonstration a row belongs and is no feature" in note
-    assert ("write each to a table of its own" in note) == (cells != "7,7,7,7,7")
+    if cells == "7,7,7,7,7":
+        assert (
+            note == f"column {name!r} says to which demonstration a row belongs and is no feature"
+        )
+        assert read.demonstrations() == (read.demonstration,)
+    else:
+        values = list(dict.fromkeys(cells.split(",")))
+        assert note == (
+            f"column {name!r} splits the rows into 3 demonstrations, {values[0]!r} to "
+            f"{values[-1]!r}, and is no feature"
+        )
+        shown = read.demonstrations()
+        assert [one.name.partition("#")[2] for one in shown] == values
+        assert [len(one) for one in shown] == [cells.split(",").count(one) for one in values]
 
 
 @pytest.mark.parametrize(
