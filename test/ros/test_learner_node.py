@@ -344,6 +344,20 @@ def test_notes_of_the_learning_are_in_the_answer_and_in_the_log(
         learner.says("are not evenly spaced, so that")
 
 
+def test_a_refusal_has_the_notes_on_what_was_read(domain: int, peer: Peer, tmp_path: Path) -> None:
+    directory = tmp_path / "demonstrations"
+    _record(directory, actions=("go",))
+    [recording] = directory.iterdir()
+    recording.write_bytes(recording.read_bytes()[:-3])
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        answer = peer.call("/learner/relearn")
+        assert not answer.success
+        assert "one action only" in answer.message
+        assert f"Note: {recording.name}: " in answer.message
+        learner.says("[WARN]")
+        learner.says(f"{recording.name}: ")
+
+
 def test_a_learning_process_that_dies_is_replaced(domain: int, peer: Peer, tmp_path: Path) -> None:
     _record(tmp_path / "demonstrations")
     with NodeProcess("learner_node", domain, tmp_path):
@@ -456,7 +470,7 @@ def test_a_tree_that_cannot_be_written_is_not_published(
     with NodeProcess("learner_node", domain, tmp_path, {"output": tmp_path / "blocked"}):
         trees = peer.listen(String, "behavior_tree", LATCHED)
         answer = peer.call("/learner/relearn")
-        assert (answer.success, "cannot be written" in answer.message) == (False, True)
+        assert (answer.success, "nothing can be written to" in answer.message) == (False, True)
         _set(peer, output=str(tmp_path / "learned"))
         assert peer.call("/learner/relearn").success
         assert json.loads((tmp_path / "learned" / "tree.json").read_text())["version"]

@@ -42,6 +42,7 @@ from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.shared_directory import SharedDirectory, Use
 from rebt_ros.storage.tree_file import find_tree
 from rebt_ros.storage.tree_versions import TreeVersions
+from rebt_ros.storage.writable import WritableDirectory
 
 #: Who subscribes later gets the latest tree, too.
 TREE_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -87,6 +88,8 @@ class LearnerNode(Node):
         self._ended = EndedDemonstrations()
         self._uncounted = ""
         self._sharing = SharedDirectory(Use.TREES)
+        self._writable = WritableDirectory()
+        self._watch.say(Finding(one, waits=False) for one in (self._unwritable(),) if one)
         self._count_ended()
         # On the second one an executor follows this learner, whoever else publishes trees.
         self._tree_publishers = [
@@ -166,7 +169,9 @@ class LearnerNode(Node):
             response.message = str(err)
             self._end(Level.OK, response.message)
         except RebtError as err:
-            response.message = str(err)
+            notes = err.notes if isinstance(err, LearningError) else ()
+            self._log(notes)
+            response.message = f"{err}{_in_short(notes)}"
             self._end(Level.WARN, response.message)
         except Exception as err:
             # The node lives on.  Once its context is shut down, all that rclpy does raises.
@@ -194,6 +199,8 @@ class LearnerNode(Node):
 
     def _learn(self, call: _Call) -> str:
         """Learns, writes and publishes; returns what a person wants to know."""
+        if why := self._unwritable():
+            raise LearningError(f"nothing was learned: {why}.")
         self._ended.learn()
         request = self._settings.request(dumps(self._learned) if self._learned else "")
         path = self._settings.output() / _TREE_FILE
@@ -203,8 +210,7 @@ class LearnerNode(Node):
             limit=self._settings.timeout() or None,
             progress=lambda progress: self._note(call, progress),
         )
-        for note in lesson.notes:
-            self.get_logger().warning(f"{note}.")
+        self._log(lesson.notes)
         learned = loads(lesson.document)
         self._hold_back(lesson)
         unjudged = (
@@ -224,6 +230,10 @@ class LearnerNode(Node):
             f"{lesson.sentence} It is published and in {path}.{unjudged}{_in_short(lesson.notes)}"
         )
 
+    def _log(self, notes: Sequence[str]) -> None:
+        for note in notes:
+            self.get_logger().warning(f"{note}.")
+
     def _write_files(self, directory: Path) -> None:
         """Writes what the command `learn` writes."""
         try:
@@ -233,8 +243,7 @@ class LearnerNode(Node):
             if self.context.ok():
                 self.get_logger().warning(f"not all files of the tree were written: {err}")
             return
-        for note in notes:
-            self.get_logger().warning(f"{note}.")
+        self._log(notes)
         self.get_logger().info(f"summary and pictures of the tree are in {directory.absolute()}.")
 
     def _hold_back(self, lesson: Lesson) -> None:
@@ -249,11 +258,12 @@ class LearnerNode(Node):
             told = "with no held-out rows" if agreement is None else f"with {agreement:.1%} of them"
             raise LearningError(
                 f"{lesson.sentence} It agrees {told}, and min_agreement is {least:.1%}: {stays}"
+                f"{_in_short(lesson.notes)}"
             )
         if lesson.rival is not None and (agreement is None or agreement < lesson.rival):
             raise LearningError(
                 f"{lesson.sentence} The published tree agrees with {lesson.rival:.1%} of the same "
-                f"held-out rows, and keep_if_better is set: {stays}"
+                f"held-out rows, and keep_if_better is set: {stays}{_in_short(lesson.notes)}"
             )
 
     def _unruled(self) -> str:
@@ -264,6 +274,12 @@ class LearnerNode(Node):
                 return f"rules_file {file} is not there, so that no tree is published"
         except (RebtError, OSError, ValueError) as err:
             return f"rules_file cannot be read ({err}), so that no tree is published"
+        return ""
+
+    def _unwritable(self) -> str:
+        """Why no tree can be written, without a full stop; else empty."""
+        with suppress(RebtError):
+            return self._writable.why_not(self._settings.output())
         return ""
 
     def _shared(self) -> str:
@@ -463,7 +479,7 @@ class LearnerNode(Node):
             "trees",
             "executors without a parameter 'learner' follow one by chance; stop all but one",
         )
-        said = (self._uncounted, self._unruled(), self._shared())
+        said = (self._uncounted, self._unruled(), self._unwritable(), self._shared())
         unfit = [Finding(one, waits=False) for one in said if one]
         problems = self._watch.say([*several, *unfit])
         if problems:
