@@ -502,6 +502,40 @@ def test_the_tree_before_is_published_again_on_request(
         assert not peer.call("/learner/rollback").success
 
 
+@pytest.mark.parametrize("broken", ["{", None])
+def test_the_newest_tree_is_published_again_where_the_one_on_disk_is_broken_or_gone(
+    broken: str | None, domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    tree = tmp_path / "learned" / "tree.json"
+    with NodeProcess("learner_node", domain, tmp_path, {"min_agreement": 1.0}) as learner:
+        assert peer.call("/learner/relearn").success
+        assert learner.stop() == 0
+    document = tree.read_text()
+    tree.unlink()
+    if broken is not None:
+        tree.write_text(broken)
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        learner.says("~/rollback")
+        heard = peer.listen(String, "behavior_tree", LATCHED)
+        answer = peer.call("/learner/rollback")
+        assert answer.success, answer.message
+        assert "published the newest tree that was kept" in answer.message
+        _latest(peer, heard, 1)
+        assert heard[0].data == document == tree.read_text()
+        assert not peer.call("/learner/rollback").success
+
+
+def test_without_a_tree_before_nothing_is_said_to_stay(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations", 6)
+    with NodeProcess("learner_node", domain, tmp_path, {"min_agreement": 1.0}):
+        answer = peer.call("/learner/relearn")
+        assert not answer.success
+        assert "it is not published, and there is no tree yet." in answer.message
+
+
 def test_a_tree_that_agrees_too_little_is_held_back_with_the_reason(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
