@@ -7,7 +7,7 @@ one event on each of their channels.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence, Set
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from pathlib import Path
@@ -31,7 +31,6 @@ from rebt_ros.storage.cells import (
     codes,
     column,
     is_failed,
-    is_maybe_missing,
     is_missing,
     is_number,
     is_truth,
@@ -43,9 +42,17 @@ from rebt_ros.storage.column_names import (
     label_position,
     of_the_actions,
 )
-from rebt_ros.storage.episode_columns import Episodes, found_episodes, named_episodes
+from rebt_ros.storage.episode_columns import (
+    Episodes,
+    found_episodes,
+    may_tell,
+    named_episodes,
+)
+from rebt_ros.storage.filling import filled_down
 from rebt_ros.storage.read import Part, Read
 from rebt_ros.storage.records import NoRow, Records, read_records
+from rebt_ros.storage.stamp_column import falls, stamps_of
+from rebt_ros.storage.table_doubts import actions_again, of_actions, of_choices, of_features
 
 #: A column of this name holds each row's stamp, in nanoseconds, and is not a feature.
 STAMP = "stamp"
@@ -53,9 +60,6 @@ STAMP = "stamp"
 #: A column of the label column's name and this says how each action ended: "success" or "failure".
 #: It is no feature, because it is known only afterwards.
 OUTCOME_SUFFIX = ".outcome"
-
-#: Where there are more actions than that, they should recur.
-_MANY_ACTIONS = 20
 
 
 def read_csv(
@@ -99,20 +103,32 @@ def read_csv(
     notes: list[str] = []
     table = _open(path, labels, channels, header, notes)
     labelled = _labelled(table, notes)
-    cells = tuple(zip(*(table.rows[row] for row in labelled), strict=True))
+    cells, filled = filled_down(
+        table.columns,
+        table.rows,
+        table.labels,
+        labelled,
+        lambda name, its: counts_rows(name, [its]) or may_tell(name),
+    )
+    notes += filled
     shown = _Shown(table, labelled, cells)
-    stamps = shown.stamps()
+    stamps, unit = shown.stamps() or (None, "")
     outcomes = _outcomes(table, notes)
     if row_kind is None:
         row_kind = RowKind.EVENT if outcomes else RowKind.SAMPLE
     known = outcomes if stamps is None else outcomes | {STAMP}
     told = _episodes(shown, episode_columns, known, features)
     notes += told.notes
-    left_out = told.columns | _numbering(shown, told, known | told.columns, features, notes)
+    if stamps is not None:
+        notes += _on_stamps(stamps, unit, told)
+    again = _actions_again(shown, known | features, notes)
+    known |= again
+    left_out = told.columns | again | _numbering(shown, told, known | told.columns, features, notes)
     read, columns, unreadable = _states(shown, known | left_out, notes)
     taken, label = shown.events()
     actions, chosen = shown.actions(taken, label)
-    notes += _doubts(actions, len(taken))
+    notes += of_actions(actions, len(taken))
+    notes += of_features([one.name for one in read])
     on_channels, channel = in_sorted_order(table.channels, label)
     return Read(
         Demonstration(
@@ -299,26 +315,38 @@ def _episodes(
     return named_episodes(named, shown.rows, lambda row: f"{table.path}, line {table.lines[row]}")
 
 
+def _on_stamps(stamps: IntArray, unit: str, told: Episodes) -> Iterator[str]:
+    """How stamps are read, and that they are not in order."""
+    if unit:
+        yield f"column {STAMP!r} is read as {unit}"
+    if count := falls(stamps, told.parts):
+        yield (
+            f"column {STAMP!r} falls {count} times from a row to the next, and rows are taken in "
+            "the order of the table: sort it if things were done in the order of the stamps"
+        )
+
+
+def _actions_again(shown: _Shown, known: Set[str], notes: list[str]) -> frozenset[str]:
+    """The columns that say what the action is, beside the only one of actions."""
+    table = shown.table
+    if len(table.labels) > 1:
+        return frozenset()
+    actions = [cell.strip() for cell in shown.cells[table.labels[0]]]
+    columns = {
+        name: shown.cells[place]
+        for place, name in enumerate(table.columns)
+        if place not in table.labels and name not in known
+    }
+    found = actions_again(table.columns[table.labels[0]], columns, actions)
+    notes += [f"column {name!r} says what the action is and is no feature" for name in found]
+    return frozenset(found)
+
+
 def _of_events(parts: Sequence[Part], taken: IntArray) -> tuple[Part, ...]:
     """How many events the demonstrations have, of which a row may hold several."""
     ends = np.searchsorted(taken, np.cumsum([part.rows for part in parts], dtype=np.int64))
     counts = np.diff(ends, prepend=0).tolist()
     return tuple(Part(part.name, count) for part, count in zip(parts, counts, strict=True))
-
-
-def _doubts(actions: Sequence[str], events: int) -> list[str]:
-    """What a person may not have meant by actions of such names, or by so many of them."""
-    notes = [
-        f"{action!r} is taken for an action: leave cells without one empty"
-        for action in actions
-        if is_maybe_missing(action)
-    ]
-    if len(actions) > _MANY_ACTIONS and 2 * len(actions) > events:
-        notes.append(
-            f"{len(actions)} different actions in {events} rows, such as {actions[0]!r}, hardly "
-            "recur, and each is an action of its own: name the label column if it is another"
-        )
-    return notes
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,15 +410,12 @@ class _Shown:
                 )
         return in_sorted_order(actions, codes(actions, cells))
 
-    def stamps(self) -> IntArray | None:
-        """The stamp column; None where there is none."""
+    def stamps(self) -> tuple[IntArray, str] | None:
+        """The stamp column, and how it is read; None where there is none."""
         columns = self.table.columns
         if STAMP not in columns or columns.index(STAMP) in self.table.labels:
             return None
-        try:
-            return np.array([int(cell) for cell in self.cells[columns.index(STAMP)]], np.int64)
-        except (ValueError, OverflowError):
-            return None
+        return stamps_of(self.cells[columns.index(STAMP)])
 
     def column(self, place: int, *, decimal_commas: bool = False) -> Column | NoFeature:
         return column(
@@ -474,6 +499,7 @@ def _default_label(columns: Sequence[str], rows: Sequence[Sequence[str]], notes:
             notes.append(f"column {columns[named]!r} is taken for the actions because of its name")
         return named
     held = {row[last].strip() for row in rows}
+    notes += of_choices(columns, rows)
     if all(is_missing(cell) or is_number(cell) for cell in held):
         what = "numbers"
     elif all(is_missing(cell) or is_truth(cell) for cell in held):

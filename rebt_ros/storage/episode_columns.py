@@ -88,7 +88,7 @@ def found_episodes(
         rows: Which of the rows count, in order.
         split: Whether the demonstrations are wanted, instead of a single one.
     """
-    everywhere = {name: _filled(cells) for name, cells in columns.items() if _may_tell(name)}
+    everywhere = {name: _filled(cells) for name, cells in columns.items() if may_tell(name)}
     called = _at(everywhere, rows)
     telling = _telling({name: cells for name, cells in called.items() if _tells(name, cells)})
     parts = _parts(telling)
@@ -190,7 +190,8 @@ def _is_named(name: str) -> bool:
     return _NAMED.fullmatch(name.strip().lower()) is not None
 
 
-def _may_tell(name: str) -> bool:
+def may_tell(name: str) -> bool:
+    """Whether a column may tell demonstrations, by its name."""
     return _is_named(name) or _MAYBE.fullmatch(name.strip().lower()) is not None
 
 
