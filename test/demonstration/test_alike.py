@@ -8,6 +8,7 @@ import pytest
 
 import rebt_ros
 from rebt_ros.demonstration.together import notes_together
+from rebt_ros.inspection.inspecting import inspect
 from rebt_ros.storage.inputs import load
 
 
@@ -53,3 +54,4 @@ def test_values_are_compared_over_demonstrations(tmp_path: Path) -> None:
     )
     notes = rebt_ros.learn([tmp_path / "0.csv", tmp_path / "1.csv"]).notes
     assert actions in notes
+    assert actions in inspect(load([tmp_path / "0.csv", tmp_path / "1.csv"]).demonstrations).notes
