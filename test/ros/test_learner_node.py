@@ -341,7 +341,7 @@ def test_notes_of_the_learning_are_in_the_answer_and_in_the_log(
         assert answer.success, answer.message
         assert "Note: the rows of channel 'action' are not evenly spaced" in answer.message
         learner.says("[WARN]")
-        learner.says("are not evenly spaced, so that")
+        learner.says("are not evenly spaced, so one row back")
 
 
 def test_a_refusal_has_the_notes_on_what_was_read(domain: int, peer: Peer, tmp_path: Path) -> None:
