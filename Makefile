@@ -16,6 +16,8 @@ VENV_PYTHON := .venv/bin/python
 # The colcon of the environment or of the sourced ROS 2, run by the environment's Python in either
 # case: that is the one which the built executables get in their first line.
 COLCON := $(VENV_PYTHON) -P -c 'import sys; from colcon_core.command import main; sys.exit(main())'
+# What colcon writes to be sourced fails where the path of its Python has blanks.
+QUOTED := sed -i 's/"$$($$_colcon_python_executable /"$$("$$_colcon_python_executable" /'
 QUIET := desktop_notification- status-
 SOURCES := rebt_ros test setup.py .ci
 
@@ -38,6 +40,7 @@ setup: ## Make .venv with everything needed; once per change of the dependencies
 build: setup ## Build into install/; then: source install/setup.bash
 	@rm -rf build/rebt_ros install/rebt_ros
 	@env -u PYTHONDONTWRITEBYTECODE $(COLCON) build --packages-select rebt_ros --event-handlers $(QUIET)
+	@$(QUOTED) install/local_setup.sh install/local_setup.bash
 
 demo: export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 demo: build ## Demonstrate, learn and let the learned tree drive a simulated robot (ARGS="..." for options).

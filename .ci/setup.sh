@@ -97,9 +97,14 @@ if ! usable; then
 fi
 rm -f $stamp
 
+# What else is on Python's path, such as another workspace, would count as installed in .venv; of a
+# ROS 2 that is sourced, it does.
+own_path=()
+if [[ $ros == wheels ]]; then own_path=(env -u PYTHONPATH); fi
+
 pip_install() {
     # Quiet down to errors: pip's progress and warnings would bury what comes after.
-    $venv/bin/python -m pip install -qq --no-input --disable-pip-version-check \
+    "${own_path[@]}" $venv/bin/python -m pip install -qq --no-input --disable-pip-version-check \
         ${constraints:+-c "$constraints"} "$@" ||
         fail "pip could not install $*"
 }

@@ -15,6 +15,7 @@ from typing import Final
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 import rebt_ros.errors
 
@@ -242,6 +243,48 @@ def test_an_executable_starts_where_the_path_of_the_interpreter_has_blanks(
     assert (done.returncode, done.stdout, done.stderr) == (0, "['a b']\n", "")
     plain = f"#!{sys.executable}"
     assert _first_line(plain, None) == plain
+
+
+def test_what_is_sourced_works_where_the_path_of_the_interpreter_has_blanks(tmp_path: Path) -> None:
+    makefile = (CHECKOUT / "Makefile").read_text()
+    quoted = next(line for line in makefile.splitlines() if line.startswith("QUOTED := "))
+    command = quoted.removeprefix("QUOTED := ").replace("$$", "$")
+    interpreter = tmp_path / "my python"
+    interpreter.symlink_to(sys.executable)
+    script = tmp_path / "local_setup.sh"
+    # As colcon writes it.
+    script.write_text(
+        f'_colcon_python_executable="{interpreter}"\n'
+        """_commands="$($_colcon_python_executable -c 'print(1 + 1)')"\necho "$_commands"\n"""
+    )
+    subprocess.run(f"{command} {script}", shell=True, check=True)
+    done = subprocess.run(["sh", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "2\n", "")
+
+
+@pytest.mark.parametrize("value", ["/my ws #1/it's, %é/robot.yaml", True, 0.5, 3])
+def test_the_demo_gives_nodes_their_parameters_whatever_is_in_a_path(value: object) -> None:
+    demo = pytest.importorskip("rebt_ros.commands.demo")
+    given = demo._yaml(Path(value) if isinstance(value, str) else value)
+    assert yaml.safe_load(given) == value
+
+
+@needs_installation
+def test_the_demo_finds_its_files_where_nothing_was_sourced() -> None:
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if "PYTHON" not in name and "AMENT" not in name
+    }
+    code = "from rebt_ros.commands import demo; print(demo._shared_files())"
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code],
+        capture_output=True,
+        text=True,
+        env=environment | {"PYTHONPATH": str(INSTALLED.parent)},
+        check=False,
+    )
+    assert Path(done.stdout.strip()) == INSTALLED.parents[3] / "share" / PACKAGE, done.stderr
 
 
 @needs_installation

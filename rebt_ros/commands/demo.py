@@ -36,6 +36,7 @@ from rclpy.utilities import try_shutdown
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 
+import rebt_ros
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.document import loads
 from rebt_ros.commands.shell import aligned, count, directory, parse, run, use_color
@@ -133,7 +134,7 @@ def _demonstrate(plan: Plan) -> None:
     os.environ["ROS_DOMAIN_ID"] = str(random.SystemRandom().randrange(215, 233))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     (plan.out / "logs").mkdir(parents=True)
-    with _processes(plan) as processes, _person(processes) as person:
+    with _processes(plan) as processes, _person(processes, plan.out) as person:
         print("Starting robot, demonstrator, recorder, learner and executor …")
         person.wait_for_nodes()
         if plan.studio:
@@ -207,11 +208,19 @@ def _free_port() -> int:
     return _USUAL_PORT
 
 
+#: Of a module of the installed package below its prefix, beside its file: lib, its Python's
+#: directory, site-packages, and the package.
+_DEPTH = 4
+
+
 def _prefix() -> Path:
     """Where the package is installed."""
     try:
         return Path(get_package_prefix("rebt_ros"))
-    except PackageNotFoundError as err:
+    except (PackageNotFoundError, OSError) as err:  # the latter where nothing at all was sourced
+        prefix = Path(rebt_ros.__file__).parents[_DEPTH]
+        if (prefix / "share" / "rebt_ros").is_dir():
+            return prefix
         raise DemoError(
             "the package rebt_ros is not in the environment: "
             "build it and source install/local_setup.bash first, or use 'make demo'."
@@ -226,9 +235,16 @@ def _command(name: str, parameters: dict[str, Any]) -> list[str]:
     command = [str(_prefix() / "lib" / "rebt_ros" / name), "--ros-args"]
     command += ["--params-file", str(_shared_files() / "config" / f"{name}.yaml")]
     for parameter, value in parameters.items():
-        text = str(value).lower() if isinstance(value, bool) else str(value)
-        command += ["-p", f"{parameter}:={text}"]
+        command += ["-p", f"{parameter}:={_yaml(value)}"]
     return command
+
+
+def _yaml(value: object) -> str:
+    """A parameter's value, in which a path may have blanks and signs."""
+    if isinstance(value, str | Path):
+        quoted = str(value).replace("'", "''")
+        return f"'{quoted}'"
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
@@ -244,10 +260,10 @@ def _stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
 
 
 @contextlib.contextmanager
-def _person(processes: dict[str, subprocess.Popen[bytes]]) -> Iterator[Person]:
+def _person(processes: dict[str, subprocess.Popen[bytes]], out: Path) -> Iterator[Person]:
     rclpy.init(args=arguments_for_logging(sys.argv), signal_handler_options=SignalHandlerOptions.NO)
     try:
-        person = Person(processes)
+        person = Person(processes, out)
         try:
             yield person
         finally:
@@ -259,8 +275,9 @@ def _person(processes: dict[str, subprocess.Popen[bytes]]) -> Iterator[Person]:
 class Person(Node):
     """Calls the services that a person would call, and watches what comes of it."""
 
-    def __init__(self, processes: dict[str, subprocess.Popen[bytes]]) -> None:
+    def __init__(self, processes: dict[str, subprocess.Popen[bytes]], out: Path) -> None:
         super().__init__("person")
+        self._logs = out / "logs"
         self._processes = processes
         self._runs: list[dict[str, Any]] = []
         self.document = ""
@@ -357,9 +374,9 @@ class Person(Node):
             rclpy.spin_once(self, timeout_sec=0.05)
             for name, process in self._processes.items():
                 if process.poll() is not None:
-                    raise DemoError(f"the {name} has ended by itself: see logs/{name}.log.")
+                    raise DemoError(f"the {name} has ended by itself: see {self._logs / name}.log.")
             if time.monotonic() > deadline:
-                raise DemoError(f"waited {timeout:.0f} s in vain for {what}: see the logs.")
+                raise DemoError(f"waited {timeout:.0f} s in vain for {what}: see {self._logs}.")
         return found
 
 

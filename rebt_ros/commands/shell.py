@@ -183,6 +183,14 @@ def add_input_options(parser: argparse.ArgumentParser, *, required: bool = True)
         "(default: the column called action, else the last one)",
     )
     tables.add_argument(
+        "--episode-column",
+        action="append",
+        metavar="COLUMN",
+        help="column that says to which demonstration a row belongs, which splits the table; "
+        "repeatable, where only several tell them apart; none for a single demonstration (default: "
+        "a column called episode, trial, demo, run_id, … whose values do not come back)",
+    )
+    tables.add_argument(
         "--no-header", action="store_true", help="the first line is a row; columns are x0, x1, …"
     )
     tables.add_argument(
@@ -294,6 +302,7 @@ def input_options(
         labels=tuple(arguments.label),
         header=not arguments.no_header,
         row_kind=arguments.rows,
+        episode_columns=_episode_columns(arguments.episode_column),
         state_topics=tuple(map(_state_topic, arguments.state_topic)),
         action_topics=tuple(arguments.action_topic),
         sample_rate=arguments.sample_rate,
@@ -354,6 +363,10 @@ def _tell_counts(counts: ReadCounts) -> None:
             f"{counts.read} read{aside}",
             file=sys.stderr,
         )
+
+
+def _episode_columns(named: list[str] | None) -> tuple[str, ...] | None:
+    return () if named == ["none"] else None if named is None else tuple(named)
 
 
 def _state_topic(text: str) -> StateTopic:

@@ -223,10 +223,10 @@ class DemonstrationBuilder:
         for topic in self._fields:
             recent = self._recent.get(topic)
             known = self._latest.get(topic)
-            came = "came before the first message"
+            came = "came before the first usable message"
             if known is not None and sent is not None and recent is not None:
                 known = recent.at(sent)
-                came = "was sent before the first message that is known"
+                came = "was sent before the first usable message that is known"
             if known is None:
                 raise BadMessageError(
                     Fault.NO_STATE,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple, Protocol
 
@@ -86,6 +86,21 @@ class Demonstration:
     def __len__(self) -> int:
         return len(self.chosen)
 
+    def part(self, name: str, rows: slice) -> Demonstration:
+        """Some of its rows that follow each other, as a demonstration of their own."""
+        actions, chosen = _occurring(self.actions, self.chosen[rows])
+        channels, channel = _occurring(self.channels, self.channel[rows])
+        return replace(
+            self,
+            name=name,
+            states=self.states[rows],
+            stamps=self.stamps[rows],
+            actions=actions,
+            chosen=chosen,
+            channels=channels,
+            channel=channel,
+        )
+
     @classmethod
     def from_rows(
         cls,
@@ -161,6 +176,12 @@ class _Codes:
 
     def sorted(self) -> tuple[tuple[str, ...], IntArray]:
         return in_sorted_order(tuple(self._code), np.frombuffer(self._column, dtype=np.int64))
+
+
+def _occurring(labels: tuple[str, ...], codes: IntArray) -> tuple[tuple[str, ...], IntArray]:
+    """The same column of strings with only the labels that occur."""
+    occurring, positions = np.unique(codes, return_inverse=True)
+    return tuple(labels[code] for code in occurring.tolist()), positions.astype(np.int64)
 
 
 def in_sorted_order(labels: tuple[str, ...], codes: IntArray) -> tuple[tuple[str, ...], IntArray]:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from rebt_ros.arrays import BoolArray, IntArray
+from rebt_ros.demonstration.alike import alike
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.errors import OptionError
 from rebt_ros.inspection import duplicates, outliers
@@ -101,7 +102,7 @@ def inspect(
         _actions(rows, counts.sum(axis=0)),
         len(against.rows),
         tuple(inspected),
-        tuple(_notes(rows)),
+        (*_notes(rows), *alike(demonstrations)),
     )
 
 

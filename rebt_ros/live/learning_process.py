@@ -84,7 +84,17 @@ class Lesson:
 
 
 class LearningError(RebtError):
-    """Nothing was learned; the message says why."""
+    """Nothing was learned; the message says why.
+
+    Args:
+        message: That.
+        notes: What a person should know about the recordings, as far as they were read; no full
+            stops.
+    """
+
+    def __init__(self, message: str, notes: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.notes = tuple(notes)
 
 
 class LearningCancelledError(LearningError):
@@ -227,7 +237,7 @@ class LearningProcess:
                 f"the learning process {_ending(process)}: call again to try once more."
             )
         if "error" in reply:
-            raise LearningError(reply["error"])
+            raise LearningError(reply["error"], reply.get("notes", ()))
         return reply
 
     def cancel(self) -> bool:

@@ -130,6 +130,7 @@ def _reply(line: bytes, known: Known, tell: Tell) -> dict[str, Any]:
         known: What is known from earlier lines.
         tell: Told how far a request is.
     """
+    notes: list[str] = []
     try:
         message = json.loads(line)
         learned, known.learned = known.learned, None
@@ -138,10 +139,10 @@ def _reply(line: bytes, known: Known, tell: Tell) -> dict[str, Any]:
         if "write" in message:
             return {"notes": write(learned, Path(message["write"])) if learned else []}
         del learned
-        known.learned = learn(Request(**message), tell, known.recordings)
+        known.learned = learn(Request(**message), tell, known.recordings, notes)
         return asdict(known.learned.lesson)
     except RebtError as err:
-        return {"error": str(err)}
+        return {"error": str(err), "notes": notes}
     except ImportError as err:
         return {"error": f"{err.name or err} is not installed: install it and call again."}
     except MemoryError:
@@ -158,6 +159,7 @@ def learn(
     request: Request,
     tell: Tell = lambda progress: None,
     recordings: KeptRecordings | None = None,
+    notes: list[str] | None = None,
 ) -> Learned:
     """Learns from all recordings of a directory, in this process.
 
@@ -165,6 +167,8 @@ def learn(
         request: What to learn.
         tell: Told how far it is.
         recordings: What was read earlier, and is not read again; None for nothing.
+        notes: Takes what a person should know about the recordings and about the tree, also where
+            nothing is learned; no full stops.
 
     Raises:
         RebtError: They cannot be used, or an option makes no sense.
@@ -191,22 +195,20 @@ def learn(
         recordings_in(Path(request.demonstrations)),
         lambda share: tell(Progress("reading", _READING * share)),
     )
+    notes = [] if notes is None else notes
+    notes += no_recordings(Path(request.demonstrations))
+    notes += [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
+    demonstrations = [read.demonstration for read in reads]
+    notes += notes_together(demonstrations)
     robot = next((read.robot for read in reads if read.robot is not None), None)
-    tables = [
-        replace(table, robot=robot)
-        for table in tabulate([read.demonstration for read in reads], declared)
-    ]
+    tables = [replace(table, robot=robot) for table in tabulate(demonstrations, declared)]
     learnings = pipeline.learn_channels(
         tables,
         options,
         lambda stage, share: tell(Progress(stage, _READING + (1.0 - _READING) * share)),
     )
-    demonstrations = [read.demonstration for read in reads]
     kept = _ruled(pipeline.side_by_side(learnings), request, demonstrations)
     learned = kept.learned
-    notes = list(no_recordings(Path(request.demonstrations)))
-    notes += [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
-    notes += notes_together(demonstrations)
     notes += [note for learning in learnings for note in learning.notes]
     led = {
         f"{learning.table.channel}: " if len(learnings) > 1 else "": learning.report

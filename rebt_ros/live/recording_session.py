@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, StateTopic
+from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder, Fault, StateTopic
 from rebt_ros.demonstration.demonstration import Row
 from rebt_ros.demonstration.recent_states import RecentStates
 from rebt_ros.demonstration.schema import Feature
@@ -125,6 +125,10 @@ class RecordingSession:
         self._recent: dict[str, RecentStates] = {}
         # Topics whose last message was refused.
         self._unclear: set[str] = set()
+        self._may_miss = {topic.name for topic in self._topics if topic.may_miss}
+        self._usable: set[str] = set()
+        # Actions of the demonstration under way that came before its first state.
+        self._early = 0
         self._held: dict[str, str] = {}
         self._builder: DemonstrationBuilder | None = None
         self._writer: Writer | None = None
@@ -157,6 +161,10 @@ class RecordingSession:
         """Whether actions become rows."""
         return self._builder is not None
 
+    def knows(self, topic: str) -> bool:
+        """Whether a state topic has ever had a message that a row can be made of."""
+        return topic in self._usable
+
     @property
     def writer(self) -> Writer | None:
         """The file of the demonstration under way, once that has a row."""
@@ -179,6 +187,8 @@ class RecordingSession:
         if self._builder is None:
             self._latest[topic] = message
             self._unclear.discard(topic)
+            if topic in self._may_miss or (values and all(map(math.isfinite, values))):
+                self._usable.add(topic)
             return
         with self._noting_faults():
             # What is refused may be an intruder or the first of a new length: a demonstration to
@@ -186,6 +196,7 @@ class RecordingSession:
             self._unclear.add(topic)
             rows = self._builder.observe(stamp, topic, values, labels, sent)
             self._unclear.discard(topic)
+            self._usable.add(topic)
             self._latest[topic] = message
             self._write(rows)
 
@@ -383,15 +394,20 @@ class RecordingSession:
                 with contextlib.suppress(BadMessageError):
                     builder.act(stamp, channel, label)
         self._builder = builder
+        self._early = 0
 
     def _end(self, stamp: int, *, aside: bool = False) -> Answer:
         """Closes the file under way, or sets it aside."""
         if self._sample_rate is not None:
             self._take_due(stamp)
         writer, self._writer = self._writer, None
+        early = self._left_out()
+        if writer is None and self.failure:
+            return Answer(False, f"rows were lost: {self.failure}{early}")
         if writer is None:
             # Nobody has to show what failed, nor what a tree does.
-            return Answer(self.awaited or self.origin is Origin.TAKEOVER, NO_ROWS)
+            is_right = (self.awaited or self.origin is Origin.TAKEOVER) and not early
+            return Answer(is_right, f"{NO_ROWS}{early}")
         try:
             writer.set_aside() if aside else writer.close()
         except RebtError as err:
@@ -401,8 +417,15 @@ class RecordingSession:
             self._ended = _Ended(writer, self.origin)
         rows = f"{_count(writer.rows)} in {writer.path}"
         if aside:
-            return Answer(True, f"the takeover did not help and is set aside: {rows}.")
-        return Answer(True, f"recorded {rows}.")
+            return Answer(True, f"the takeover did not help and is set aside: {rows}.{early}")
+        return Answer(True, f"recorded {rows}.{early}")
+
+    def _left_out(self) -> str:
+        """A sentence on actions of the demonstration under way that came too early."""
+        if not self._early:
+            return ""
+        came = "1 action is" if self._early == 1 else f"{self._early} actions are"
+        return f" {came} left out, which came before the first state."
 
     def _take_due(self, stamp: int) -> None:
         """Takes the samples that are due since the last message."""
@@ -416,6 +439,7 @@ class RecordingSession:
         try:
             yield
         except BadMessageError as err:
+            self._early += err.fault is Fault.NO_STATE
             self._note(err.fault.value, str(err))
 
     def _write(self, rows: Sequence[Row]) -> None:

@@ -127,7 +127,7 @@ def learn(
         loaded.accounts,
         proven,
         aside=loaded.aside,
-        excluded=loaded.excluded,
+        excluded=(*loaded.excluded, *loaded.excluded_parts),
         paths=files,
         weights=weights,
     )
@@ -222,7 +222,7 @@ def _not_on_a_robot(learned: LearnedTree) -> Iterator[str]:
         if not _TOPIC.fullmatch(channel):
             yield (
                 f"{channel!r} is no name of a topic, so that the executor refuses this tree: "
-                "rename the label column, with letters, digits and underscores"
+                "name the topic or label column with letters, digits and underscores"
             )
 
 

@@ -41,8 +41,8 @@ class OfflineLearning:
     """The rules that the tree was proven to keep, each in a line."""
     aside: tuple[Aside, ...] = ()
     """Inputs that could not be read, and were left out."""
-    excluded: tuple[Path, ...] = ()
-    """Inputs that were left out as asked."""
+    excluded: tuple[Path | str, ...] = ()
+    """What was left out as asked: files, and names of single demonstrations of tables."""
     paths: Mapping[str, Path] = field(default_factory=dict)
     """The file of each demonstration, as far as it is known."""
     weights: Mapping[str, int] = field(default_factory=dict)

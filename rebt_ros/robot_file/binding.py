@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -44,6 +44,15 @@ class BoundTopic:
     """What makes labels of its messages, by channel."""
     has_stamp: bool
     """Whether the stamp in its header says when a message is from."""
+
+    def lacks(self) -> Iterator[str]:
+        """What its latest message should have and does not, without full stops."""
+        for channel, one in self.labellers.items():
+            if one.lacks:
+                yield (
+                    f"messages on {self.name!r} do not have {one.lacks}, which the actions "
+                    f"{channel!r} name: see which ones move when they are used"
+                )
 
     @property
     def wanted(self) -> frozenset[tuple[str, ...]]:

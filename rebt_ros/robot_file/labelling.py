@@ -37,6 +37,8 @@ class Labeller(Protocol):
     """The attributes of messages that are read, each with all that is in it."""
     acts: bool
     """Whether somebody does something, by the latest message."""
+    lacks: str
+    """What is wanted and the latest message does not have, for people; empty for nothing."""
 
     def labels(self, message: Any, stamp: int) -> Sequence[str]:
         """What a message says that is done from now on; empty labels for nothing any longer.
@@ -109,6 +111,7 @@ class PathLabeller:
         self._get = getter(path)
         self._labels = source.labels
         self.acts = False
+        self.lacks = ""
         self._text = _written(path.kind, path.names)
         self._changes = _Changes(source.emit)
 
@@ -147,12 +150,16 @@ class JoyLabeller:
         self.wanted: tuple[Attributes, ...] = (("buttons",), ("axes",))
         self._source = source
         self.acts = False
+        self.lacks = ""
+        self._sizes = -1, -1
         self._down: set[int] = set()
         self._held = ""
 
     def labels(self, message: Any, stamp: int) -> Sequence[str]:
         """See `Labeller`."""
         source, buttons = self._source, message.buttons
+        if (sizes := (len(buttons), len(message.axes))) != self._sizes:
+            self._sizes, self.lacks = sizes, _beyond(source, *sizes)
         down = {one for one in {*source.press, *source.hold} if one < len(buttons) and buttons[one]}
         pressed = [source.press[one] for one in source.press if one in down - self._down]
         self._down = down
@@ -172,6 +179,16 @@ class JoyLabeller:
                 if found:
                     return found
         return ""
+
+
+def _beyond(source: JoyActions, buttons: int, axes: int) -> str:
+    """The buttons and axes that a joystick with so many does not have."""
+    wanted = (("button", {*source.press, *source.hold}, buttons), ("axis", {*source.axes}, axes))
+    return " and ".join(
+        f"{what} {', '.join(map(str, beyond))} (there are {count}, from 0)"
+        for what, places, count in wanted
+        if (beyond := sorted(place for place in places if place >= count))
+    )
 
 
 def _axis_label(labels: AxisLabels, value: float, held: str, hysteresis: float) -> str:
@@ -201,6 +218,7 @@ class TwistLabeller:
         self._stamped = stamped
         self._now = ""
         self.acts = False
+        self.lacks = ""
         self._changes = _Changes(source.emit)
 
     def labels(self, message: Any, stamp: int) -> Sequence[str]:
@@ -245,6 +263,7 @@ class LogLabeller:
         self.wanted: tuple[Attributes, ...] = (("event_log",),)
         self._labels = source.labels
         self.acts = False
+        self.lacks = ""
         self._running: dict[str, str] = {}
         self._changes = _Changes(Emit.CHANGE)
 

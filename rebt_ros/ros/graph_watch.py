@@ -10,7 +10,7 @@ from typing import Any, Final
 from rclpy.duration import Infinite
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.qos import DurabilityPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -113,6 +113,19 @@ class GraphWatch:
                 f"{len(names)} nodes publish {what} on {topic} ({who}): {advice}",
                 waits=_UNKNOWN in names,
             )
+
+    def latched(self, subscriptions: Iterable[Subscription]) -> Iterator[Finding]:
+        """Subscriptions that miss what publishers keep for those who ask for it."""
+        for subscription in subscriptions:
+            publishers = self._publishers(subscription.topic_name)
+            if publishers and all(
+                one.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in publishers
+            ):
+                yield Finding(
+                    f"what was published on {subscription.topic_name} before this node was there "
+                    "is not received (durability: transient local): publish the state regularly",
+                    waits=True,
+                )
 
     def mixed(self, states: Iterable[Subscription]) -> Iterator[Finding]:
         """State topics on which several nodes publish, as several robots do without namespaces."""

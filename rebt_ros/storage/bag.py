@@ -300,14 +300,20 @@ class Feed:
 
     def _on_silence(self) -> Iterator[str]:
         """Notes on states that had grown old, where they come often as a rule."""
+        actions = self.seen.total() - sum(self.seen[name] for name in self.there)
+        for name in sorted(self.there):
+            if self.seen[name] == 1 and actions > _FEW:
+                yield f"{name!r} has a single message, whose values are the state of all rows"
         for name, ages in sorted(self.ages.items()):
+            if self.seen[name] == 1:
+                continue
             usual = (self.latest - self.earliest) / self.seen[name]
             old = [age for age in ages if age > _SILENT * usual]
             if old:
                 yield (
                     f"{_counted(len(old), 'row')} have a state that is up to {max(old) / 1e9:.3g} "
-                    f"seconds old, as nothing came on {name!r} for so long, where a message comes "
-                    f"every {usual / 1e9:.2g} seconds: see whether its sensor or driver failed"
+                    f"seconds old, as nothing usable came on {name!r} for so long, where messages "
+                    f"come every {usual / 1e9:.2g} seconds: see whether its sensor or driver failed"
                 )
 
     def _has_no_times(self) -> bool:
@@ -353,6 +359,9 @@ class _String(Protocol):
 
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 
+#: Bytes that align the numbers of a state message.
+_PADDING: Final = 4
+
 #: How messages of either byte order begin; other encapsulations align numbers otherwise.
 _PLAIN_CDR: Final = (b"\0\0", b"\0\1")
 
@@ -372,6 +381,22 @@ def _decoded(data: bytes, kind: str) -> object:
     except Exception as err:
         # The generated decoders let whatever goes wrong inside them through.
         raise UndecodableError from err
+
+
+def _array(data: bytes) -> ArrayMessage[FloatArray]:
+    """A state message.
+
+    Raises:
+        UndecodableError: It cannot be decoded.
+    """
+    try:
+        return cast("ArrayMessage[FloatArray]", _decoded(data, STATE_TYPE))
+    except UndecodableError:
+        # Where there are no numbers, ROS 2 writes what aligns them all the same.
+        message = cast("ArrayMessage[FloatArray]", _decoded(data[:-_PADDING], STATE_TYPE))
+        if len(message.data):
+            raise
+        return message
 
 
 @dataclass(frozen=True, slots=True)
@@ -402,7 +427,7 @@ class _States:
         head = self._heads.get(len(data))
         if head is not None and data.startswith(head.data):
             return head.numbers.unpack_from(data, len(head.data)), head.labels
-        message = cast("ArrayMessage[FloatArray]", _decoded(data, STATE_TYPE))
+        message = _array(data)
         values, labels = values_of(message), names_of(message)
         self._remember(data, values, labels)
         return tuple(values.tolist()), labels

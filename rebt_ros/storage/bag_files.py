@@ -382,6 +382,14 @@ def explained(path: Path) -> Iterator[None]:
         raise _explanation(path, err) from err
 
 
+_ZIP: Final = b"PK\x03\x04"
+
+#: What zip archives are, by their suffixes, and what helps.
+_ZIPPED: Final = {
+    **dict.fromkeys((".xlsx", ".xlsm", ".ods"), "is a spreadsheet: save the table as CSV"),
+    ".npz": "is an archive of NumPy arrays: write the table as CSV, with a line of column names",
+}
+
 #: How files begin that are no files of messages, what they are, and what helps.
 _STRANGERS: Final[Sequence[tuple[bytes, str]]] = (
     (
@@ -393,7 +401,7 @@ _STRANGERS: Final[Sequence[tuple[bytes, str]]] = (
         "is a bag of ROS 1: convert it with `rosbags-convert --src FILE --dst DIRECTORY`",
     ),
     (b"\x1f\x8b", "is packed with gzip: unpack it with `gunzip`"),
-    (b"PK\x03\x04", "is a zip archive: unpack it with `unzip`"),
+    (_ZIP, "is a zip archive: unpack it with `unzip`"),
     (b"PAR1", "is a Parquet file: write it as CSV, with pandas for example"),
     (b"ARROW1", "is an Arrow file: write it as CSV, with pandas for example"),
     (b"\x89HDF", "is an HDF5 file: write it as CSV, with pandas for example"),
@@ -420,6 +428,8 @@ def refuse_strangers(path: Path) -> None:
         begin = file.read(32)
         for magic, what in _STRANGERS:
             if begin.startswith(magic):
+                if magic == _ZIP:
+                    what = _ZIPPED.get(path.suffix.lower(), what)
                 raise InputError(f"{path} {what}.")
 
 

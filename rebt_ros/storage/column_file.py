@@ -23,7 +23,7 @@ from rebt_ros.arrays import IntArray, in_parts
 from rebt_ros.demonstration.demonstration import Demonstration, RowKind
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.storage.account import Account
-from rebt_ros.storage.read import Read
+from rebt_ros.storage.read import Part, Read
 
 _MAGIC: Final = b"rebtcol1"
 #: Mark, checksum of all that follows, and length of the JSON.
@@ -67,6 +67,7 @@ def packed(read: Read, words: Mapping[str, Any] | None = None) -> Iterator[bytes
         "account": read.account.as_json() if read.account else None,
         "no_features": sorted(read.no_features),
         "has_robot": read.robot is not None,
+        "parts": read.parts,
         "columns": places,
         "words": dict(words or {}),
     }
@@ -151,7 +152,9 @@ def _read_of(said: dict[str, Any], content: memoryview) -> tuple[Read, dict[str,
         RowKind(said["row_kind"]),
     )
     account = said["account"] and Account(**said["account"])
-    read = Read(shown, tuple(said["notes"]), account, frozenset(said["no_features"]))
+    parts = tuple(Part(str(name), int(rows)) for name, rows in said["parts"])
+    no_features = frozenset(said["no_features"])
+    read = Read(shown, tuple(said["notes"]), account, no_features, parts=parts)
     return read, said["words"], bool(said["has_robot"])
 
 

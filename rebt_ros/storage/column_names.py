@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
 
 import numpy as np
 
@@ -36,13 +35,6 @@ _SECONDS = frozenset({"sec", "secs"})
 _UNIT_OF_TIME = re.compile(
     r"[ _]*[\[(]?(?:s|secs?|seconds?|m?secs?|[mun]s|n(?:ano)?secs?|utc|unix|epoch)[\])]?\Z"
 )
-#: Columns of these names say to which demonstration a row belongs where no value comes back.
-_DEMONSTRATION = re.compile(
-    r"(?:(?:episode|trial|demo|demonstration|traj|trajectory|rollout)s?"
-    r"|(?:run|session|bag)(?=[ _.]?(?:id|idx|index|no|nr|num|number|name)\Z))"
-    r"(?:[ _.]?(?:id|idx|index|no|nr|num|number|name))?"
-)
-
 _LINE_BREAKS = re.compile(r"\s*[\r\n]\s*")
 
 #: The column of one of these names holds the actions, wherever it stands.
@@ -87,6 +79,18 @@ def column_names(records: Records, labels: Sequence[str], *, header: bool) -> Co
     return _said(records.rows, first)
 
 
+def counts_rows(name: str, parts: Sequence[Sequence[str]]) -> bool:
+    """Whether a column numbers or dates the rows of every demonstration of a table.
+
+    Args:
+        name: Of the column.
+        parts: Its cells in each demonstration.  Those of too few rows do not tell, unless none
+            has more.
+    """
+    telling = [cells for cells in parts if len(cells) >= FEWEST_RISING] or parts
+    return all(numbers_rows(name, cells) or tells_time(cells) for cells in telling)
+
+
 def numbers_rows(name: str, cells: Sequence[str]) -> bool:
     """Whether a column numbers or dates the rows, by its name and by its values."""
     plain = name.strip().lower()
@@ -123,18 +127,6 @@ def tells_time(cells: Sequence[str]) -> bool:
 
 def _never_falls(values: FloatArray) -> bool:
     return bool(np.all(values[1:] >= values[:-1]))
-
-
-def tells_demonstrations(name: str, cells: Sequence[str]) -> bool:
-    """Whether a column says to which demonstration each row belongs.
-
-    By its name, and as none of its values comes back once another one has begun; a table of one
-    demonstration has one of them.
-    """
-    if not _DEMONSTRATION.fullmatch(name.strip().lower()):
-        return False
-    stretches = [cell for cell, _ in groupby(one.strip() for one in cells)]
-    return len(set(stretches)) == len(stretches) and all(stretches)
 
 
 def of_the_actions(names: Sequence[str]) -> int | None:

@@ -1,4 +1,4 @@
-"""CSV tables as demonstrations: one table is one demonstration, one row is one action.
+"""CSV tables as demonstrations: one table is one or several, one row is one action.
 
 What the cells of a column mean is told in `cells`.  Where several columns hold actions, a row is
 one event on each of their channels.
@@ -7,8 +7,9 @@ one event on each of their channels.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence, Set
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,6 @@ from rebt_ros.storage.cells import (
     codes,
     column,
     is_failed,
-    is_maybe_missing,
     is_missing,
     is_number,
     is_truth,
@@ -38,14 +38,21 @@ from rebt_ros.storage.cells import (
 )
 from rebt_ros.storage.column_names import (
     column_names,
+    counts_rows,
     label_position,
-    numbers_rows,
     of_the_actions,
-    tells_demonstrations,
-    tells_time,
 )
-from rebt_ros.storage.read import Read
+from rebt_ros.storage.episode_columns import (
+    Episodes,
+    found_episodes,
+    may_tell,
+    named_episodes,
+)
+from rebt_ros.storage.filling import filled_down
+from rebt_ros.storage.read import Part, Read
 from rebt_ros.storage.records import NoRow, Records, read_records
+from rebt_ros.storage.stamp_column import falls, stamps_of
+from rebt_ros.storage.table_doubts import actions_again, of_actions, of_choices, of_features
 
 #: A column of this name holds each row's stamp, in nanoseconds, and is not a feature.
 STAMP = "stamp"
@@ -53,9 +60,6 @@ STAMP = "stamp"
 #: A column of the label column's name and this says how each action ended: "success" or "failure".
 #: It is no feature, because it is known only afterwards.
 OUTCOME_SUFFIX = ".outcome"
-
-#: Where there are more actions than that, they should recur.
-_MANY_ACTIONS = 20
 
 
 def read_csv(
@@ -66,6 +70,7 @@ def read_csv(
     row_kind: RowKind | None = None,
     features: Set[str] = frozenset(),
     channels: Sequence[str] = (),
+    episode_columns: Sequence[str] | None = None,
 ) -> Read:
     """Reads a CSV table.
 
@@ -81,6 +86,8 @@ def read_csv(
         features: Columns that are features even where their names say that they number or date the
             rows.
         channels: Label columns of a table that has all of them, where `labels` names none.
+        episode_columns: Columns that say to which demonstration a row belongs; none for a table
+            that is a single one; None to tell by names and values.
 
     Returns:
         The rows that have an action: on the channel `DEFAULT_CHANNEL` where there is one label
@@ -96,19 +103,32 @@ def read_csv(
     notes: list[str] = []
     table = _open(path, labels, channels, header, notes)
     labelled = _labelled(table, notes)
-    cells = tuple(zip(*(table.rows[row] for row in labelled), strict=True))
+    cells, filled = filled_down(
+        table.columns,
+        table.rows,
+        table.labels,
+        labelled,
+        lambda name, its: counts_rows(name, [its]) or may_tell(name),
+    )
+    notes += filled
     shown = _Shown(table, labelled, cells)
-    stamps = shown.stamps()
+    stamps, unit = shown.stamps() or (None, "")
     outcomes = _outcomes(table, notes)
     if row_kind is None:
         row_kind = RowKind.EVENT if outcomes else RowKind.SAMPLE
     known = outcomes if stamps is None else outcomes | {STAMP}
-    left_out = _numbering(shown, known, features, notes)
-    left_out |= _episodes(shown, known | left_out, features, notes)
+    told = _episodes(shown, episode_columns, known, features)
+    notes += told.notes
+    if stamps is not None:
+        notes += _on_stamps(stamps, unit, told)
+    again = _actions_again(shown, known | features, notes)
+    known |= again
+    left_out = told.columns | again | _numbering(shown, told, known | told.columns, features, notes)
     read, columns, unreadable = _states(shown, known | left_out, notes)
     taken, label = shown.events()
     actions, chosen = shown.actions(taken, label)
-    notes += _doubts(actions, len(taken))
+    notes += of_actions(actions, len(taken))
+    notes += of_features([one.name for one in read])
     on_channels, channel = in_sorted_order(table.channels, label)
     return Read(
         Demonstration(
@@ -125,6 +145,7 @@ def read_csv(
         tuple(notes),
         _account(table, len(labelled), len(taken)),
         frozenset(left_out | unreadable),
+        parts=_of_events(told.parts, taken),
     )
 
 
@@ -222,16 +243,22 @@ def _has_decimal_commas(table: _Table, columns: Sequence[Column | NoFeature]) ->
 
 
 def _numbering(
-    shown: _Shown, known: Set[str], asked_for: Set[str], notes: list[str]
+    shown: _Shown,
+    episodes: Episodes,
+    known: Set[str],
+    asked_for: Set[str],
+    notes: list[str],
 ) -> frozenset[str]:
     """The columns that number or date the rows, but for those that are known or asked for."""
     table = shown.table
-    found = {
-        name
-        for place, name in enumerate(table.columns)
-        if place not in table.labels and name not in known and name not in asked_for
-        if numbers_rows(name, shown.cells[place]) or tells_time(shown.cells[place])
-    }
+    found = set()
+    for place, name in enumerate(table.columns):
+        if place in table.labels or name in known or name in asked_for:
+            continue
+        cells = shown.cells[place]
+        ends = [*accumulate(part.rows for part in episodes.parts)] or [len(cells)]
+        if counts_rows(name, [cells[begin:end] for begin, end in pairwise((0, *ends))]):
+            found.add(name)
     for name in sorted(found):
         integers = (
             ", and does not hold integers (nanoseconds), which could tell the time"
@@ -243,40 +270,83 @@ def _numbering(
 
 
 def _episodes(
-    shown: _Shown, known: Set[str], asked_for: Set[str], notes: list[str]
-) -> frozenset[str]:
-    """The columns that say to which demonstration a row belongs."""
+    shown: _Shown, columns: Sequence[str] | None, known: Set[str], asked_for: Set[str]
+) -> Episodes:
+    """The demonstrations of a table, by the columns that tell them.
+
+    Args:
+        shown: The rows that have an action.
+        columns: The columns that somebody named; None to find them.
+        known: Columns that say something else.
+        asked_for: Columns that are features.
+
+    Raises:
+        InputError: A column that was named is not there, says something else, or does not tell.
+    """
     table = shown.table
-    found = set()
-    for place, name in enumerate(table.columns):
-        if place in table.labels or name in known or name in asked_for:
-            continue
-        if not tells_demonstrations(name, shown.cells[place]):
-            continue
-        found.add(name)
-        note = f"column {name!r} says to which demonstration a row belongs and is no feature"
-        if (count := len({cell.strip() for cell in shown.cells[place]})) > 1:
-            note += (
-                f"; its {count} are learned from as a single one, in which each seems to go on "
-                "where the one before has ended: write each to a table of its own"
+
+    def cells(place: int) -> list[str]:
+        return [row[place] for row in table.rows]
+
+    if not columns:
+        return found_episodes(
+            {
+                name: cells(place)
+                for place, name in enumerate(table.columns)
+                if place not in table.labels and name not in known and name not in asked_for
+            },
+            shown.rows,
+            split=columns is None,
+        )
+    named = {}
+    for said in columns:
+        place = label_position(table.columns, said, said=table.said)
+        if place is None:
+            raise InputError(
+                f"{table.path}: there is no column {said!r}: {_listing(table.columns)}."
             )
-        notes.append(note)
+        name = table.columns[place]
+        if place in table.labels or name in known:
+            raise InputError(
+                f"{table.path}: column {name!r} holds actions, how they ended, or stamps: name "
+                "another episode column."
+            )
+        named[name] = cells(place)
+    return named_episodes(named, shown.rows, lambda row: f"{table.path}, line {table.lines[row]}")
+
+
+def _on_stamps(stamps: IntArray, unit: str, told: Episodes) -> Iterator[str]:
+    """How stamps are read, and that they are not in order."""
+    if unit:
+        yield f"column {STAMP!r} is read as {unit}"
+    if count := falls(stamps, told.parts):
+        yield (
+            f"column {STAMP!r} falls {count} times from a row to the next, and rows are taken in "
+            "the order of the table: sort it if things were done in the order of the stamps"
+        )
+
+
+def _actions_again(shown: _Shown, known: Set[str], notes: list[str]) -> frozenset[str]:
+    """The columns that say what the action is, beside the only one of actions."""
+    table = shown.table
+    if len(table.labels) > 1:
+        return frozenset()
+    actions = [cell.strip() for cell in shown.cells[table.labels[0]]]
+    columns = {
+        name: shown.cells[place]
+        for place, name in enumerate(table.columns)
+        if place not in table.labels and name not in known
+    }
+    found = actions_again(table.columns[table.labels[0]], columns, actions)
+    notes += [f"column {name!r} says what the action is and is no feature" for name in found]
     return frozenset(found)
 
 
-def _doubts(actions: Sequence[str], events: int) -> list[str]:
-    """What a person may not have meant by actions of such names, or by so many of them."""
-    notes = [
-        f"{action!r} is taken for an action: leave cells without one empty"
-        for action in actions
-        if is_maybe_missing(action)
-    ]
-    if len(actions) > _MANY_ACTIONS and 2 * len(actions) > events:
-        notes.append(
-            f"{len(actions)} different actions in {events} rows, such as {actions[0]!r}, hardly "
-            "recur, and each is an action of its own: name the label column if it is another"
-        )
-    return notes
+def _of_events(parts: Sequence[Part], taken: IntArray) -> tuple[Part, ...]:
+    """How many events the demonstrations have, of which a row may hold several."""
+    ends = np.searchsorted(taken, np.cumsum([part.rows for part in parts], dtype=np.int64))
+    counts = np.diff(ends, prepend=0).tolist()
+    return tuple(Part(part.name, count) for part, count in zip(parts, counts, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,15 +410,12 @@ class _Shown:
                 )
         return in_sorted_order(actions, codes(actions, cells))
 
-    def stamps(self) -> IntArray | None:
-        """The stamp column; None where there is none."""
+    def stamps(self) -> tuple[IntArray, str] | None:
+        """The stamp column, and how it is read; None where there is none."""
         columns = self.table.columns
         if STAMP not in columns or columns.index(STAMP) in self.table.labels:
             return None
-        try:
-            return np.array([int(cell) for cell in self.cells[columns.index(STAMP)]], np.int64)
-        except (ValueError, OverflowError):
-            return None
+        return stamps_of(self.cells[columns.index(STAMP)])
 
     def column(self, place: int, *, decimal_commas: bool = False) -> Column | NoFeature:
         return column(
@@ -432,6 +499,7 @@ def _default_label(columns: Sequence[str], rows: Sequence[Sequence[str]], notes:
             notes.append(f"column {columns[named]!r} is taken for the actions because of its name")
         return named
     held = {row[last].strip() for row in rows}
+    notes += of_choices(columns, rows)
     if all(is_missing(cell) or is_number(cell) for cell in held):
         what = "numbers"
     elif all(is_missing(cell) or is_truth(cell) for cell in held):

@@ -109,6 +109,9 @@ class InputOptions:
     the rows."""
     channels: tuple[str, ...] = ()
     """Of CSV tables that have all of these columns, the labels where `labels` names none."""
+    episode_columns: tuple[str, ...] | None = None
+    """Of CSV tables, columns that say to which demonstration a row belongs; none (`()`) for tables
+    that are a single one each; None to tell by names and values."""
     state_topics: tuple[StateTopic, ...] = ()
     """Of bags, the topics of the state; by default the only one of numbers."""
     action_topics: tuple[str, ...] = ()
@@ -121,7 +124,7 @@ class InputOptions:
     """Of bags, where features and actions are in messages of any type, instead of topics."""
     exclude: tuple[str, ...] = ()
     """Demonstrations that are left out, before they are read: names of files, paths, patterns, and
-    `@list.txt` with such in its lines."""
+    `@list.txt` with such in its lines.  What follows a `#` says which demonstrations of a table."""
     weights: tuple[tuple[str, Fraction], ...] = ()
     """How much demonstrations count, by such names, of which the last one that fits tells; also as
     a mapping.  Others count 1, and what counts 0 is left out.  Where nothing is learned, only that
@@ -137,6 +140,9 @@ class InputOptions:
         """
         for name in ("labels", "channels", "action_topics", "exclude"):
             object.__setattr__(self, name, _texts(name, getattr(self, name)))
+        if self.episode_columns is not None:
+            named = _texts("episode_columns", self.episode_columns)
+            object.__setattr__(self, "episode_columns", named)
         object.__setattr__(self, "weights", _weights(self.weights))
         topics = self.state_topics
         several = (topics,) if isinstance(topics, str | StateTopic) else topics
@@ -149,9 +155,9 @@ class InputOptions:
         if isinstance(self.row_kind, str) and self.row_kind in kinds:
             object.__setattr__(self, "row_kind", kinds[self.row_kind])
         rate = self.sample_rate
-        named = all(isinstance(one, StateTopic) for one in self.state_topics)
+        are_topics = all(isinstance(one, StateTopic) for one in self.state_topics)
         for name, fits, what in (
-            ("state_topics", named, "names"),
+            ("state_topics", are_topics, "names"),
             ("row_kind", isinstance(self.row_kind, RowKind | None), f"one of {', '.join(kinds)}"),
             ("header", isinstance(self.header, bool), "True or False"),
             ("skip_bad", isinstance(self.skip_bad, bool), "True or False"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -11,7 +12,7 @@ from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.errors import InputError, OptionError, RebtError, listing
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.account import Account
-from rebt_ros.storage.addressing import weighted
+from rebt_ros.storage.addressing import wanted, weighted
 from rebt_ros.storage.bag import read_bag
 from rebt_ros.storage.column_names import FEWEST_RISING
 from rebt_ros.storage.csv_table import read_csv
@@ -30,11 +31,11 @@ class Loaded:
 
     demonstrations: tuple[Demonstration, ...]
     """Their names differ: they are those of their files, or their paths where several files have
-    one name."""
+    one name; of several in a table, `#` and what it says follow."""
     notes: tuple[str, ...]
-    """What a person should know, each led by the name of its demonstration."""
+    """What a person should know, each led by the name of a file, as demonstrations are called."""
     accounts: Mapping[str, Account] = field(default_factory=dict)
-    """Where what each demonstration's file holds went, by the same names."""
+    """Where what each file holds went, by the same names."""
     robot: RobotFile | None = None
     """Where features and actions are in messages, as the first file has it that says so."""
     aside: tuple[Aside, ...] = ()
@@ -42,9 +43,11 @@ class Loaded:
     paths: tuple[Path, ...] = ()
     """Of the demonstrations."""
     excluded: tuple[Path, ...] = ()
-    """What was left out as asked, in the order of the inputs."""
+    """Files that were left out as asked, in the order of the inputs."""
     weights: tuple[Fraction, ...] = ()
     """How much each demonstration counts."""
+    excluded_parts: tuple[str, ...] = ()
+    """Demonstrations of tables that were left out as asked, where others of these were not."""
 
 
 def as_paths(inputs: Sequence[str | Path] | str | Path) -> tuple[Path, ...]:
@@ -83,9 +86,11 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     is_chosen = bool(options.exclude or options.weights)
     every = sources_of(inputs, strict=options.plan.strict and not is_chosen)
     paths = [one.path for one in every]
-    counting = weighted(names_of(every), paths, options.exclude, options.weights)
-    left_out = tuple(path for path, count in zip(paths, counting, strict=True) if not count)
-    sources = [one for one, count in zip(every, counting, strict=True) if count]
+    read_at_all = wanted(names_of(every), paths, options.exclude, options.weights)
+    left_out = tuple(
+        path for path, is_read in zip(paths, read_at_all.files, strict=True) if not is_read
+    )
+    sources = [one for one, is_read in zip(every, read_at_all.files, strict=True) if is_read]
     strange_one = next((one for one in sources if isinstance(one, Strange)), None)
     if strange_one is not None and options.plan.strict:
         raise strange_one.error
@@ -99,7 +104,6 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         if isinstance(answer, RebtError)
     }
     aside = _aside([one.path for one in sources if one.path in errors], errors, len(sources))
-    weights = dict(zip(paths, counting, strict=True))
     names = dict(zip((one.path for one in sources), names_of(sources), strict=True))
     there = [
         (source.path, _named(answer, names[source.path]))
@@ -110,8 +114,16 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
         options.plan.tell(aside)
     options.plan.tell_counts(ReadCounts(gathered.cached, len(there) - gathered.cached, len(aside)))
     reads = _with_common_features([read for _, read in there])
+    shown = _Shown.of(reads, [path for path, _ in there])
+    counting = weighted(
+        shown.names, shown.paths, options.exclude, options.weights, shown.files, read_at_all.done
+    )
+    kept = shown.only([place for place, count in enumerate(counting) if count])
+    not_shown = [name for name, count in zip(shown.names, counting, strict=True) if not count]
     notes = (
-        *_notes_on_excluded(left_out, len(every)),
+        *_notes_on_excluded(
+            [*map(str, left_out), *not_shown], len(every) + len(shown.names) - len(there)
+        ),
         *_notes_on_cache(gathered, options),
         *passed_over(inputs, {one.path for one in every}),
         *(
@@ -123,15 +135,61 @@ def load(inputs: Sequence[Path], options: InputOptions | None = None) -> Loaded:
     if notes:
         options.plan.tell_notes(notes)
     return Loaded(
-        tuple(read.demonstration for read in reads),
+        kept.demonstrations,
         notes,
         {read.demonstration.name: read.account for read in reads if read.account},
         next((read.robot for read in reads if read.robot is not None), None),
         aside,
-        tuple(path for path, _ in there),
+        kept.paths,
         left_out,
-        tuple(weights[path] for path, _ in there),
+        tuple(filter(None, counting)),
+        tuple(not_shown),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """Demonstrations, of which a table may hold several."""
+
+    demonstrations: tuple[Demonstration, ...]
+    paths: tuple[Path, ...]
+    """Of their files."""
+    files: tuple[str, ...]
+    """What these are called."""
+
+    @classmethod
+    def of(cls, reads: Sequence[Read], paths: Sequence[Path]) -> _Shown:
+        """All that was read, from these files.
+
+        Raises:
+            InputError: Two of them have one name.
+        """
+        all_of_them = [
+            (one, path, read.demonstration.name)
+            for read, path in zip(reads, paths, strict=True)
+            for one in read.demonstrations()
+        ]
+        counts = Counter(one.name for one, _, _ in all_of_them)
+        twice = next((one for one in all_of_them if counts[one[0].name] > 1), None)
+        if twice is not None:
+            raise InputError(
+                f"{twice[1]}: two demonstrations are called {twice[0].name!r}: give each a name of "
+                "its own."
+            )
+        shown, of_files, files = zip(*all_of_them, strict=True)
+        return cls(shown, of_files, files)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(one.name for one in self.demonstrations)
+
+    def only(self, places: Sequence[int]) -> _Shown:
+        """Some of them."""
+        return _Shown(
+            tuple(self.demonstrations[place] for place in places),
+            tuple(self.paths[place] for place in places),
+            tuple(self.files[place] for place in places),
+        )
 
 
 def _named(read: Read, name: str) -> Read:
@@ -183,10 +241,10 @@ def _aside(
     return tuple(Aside(path, str(errors[path])) for path in paths)
 
 
-def _notes_on_excluded(paths: Sequence[Path], inputs: int) -> Iterator[str]:
-    if paths:
-        count = f"{len(paths)} of {inputs}"
-        yield f"{count} demonstrations are left out as asked: {listing(paths)}"
+def _notes_on_excluded(names: Sequence[str], every: int) -> Iterator[str]:
+    if names:
+        count = f"{len(names)} of {every}"
+        yield f"{count} demonstrations are left out as asked: {listing(names)}"
 
 
 def _notes_on_cache(gathered: Gathered, options: InputOptions) -> Iterator[str]:
@@ -233,6 +291,7 @@ def holds_bags(inputs: Sequence[Path]) -> bool:
 def _check_options(options: InputOptions, kinds: set[InputKind]) -> None:
     given = (
         (bool(options.labels), "a label column", InputKind.TABLE),
+        (bool(options.episode_columns), "an episode column", InputKind.TABLE),
         (not options.header, "the absence of a header", InputKind.TABLE),
         (options.row_kind is not None, "what a row is", InputKind.TABLE),
         (bool(options.state_topics), "a state topic", InputKind.BAG),
@@ -263,7 +322,14 @@ def _deciding_options(kind: InputKind, options: InputOptions) -> tuple[object, .
     if kind is InputKind.TABLE:
         row_kind = options.row_kind.value if options.row_kind else None
         features = sorted(options.features)
-        return (options.labels, options.channels, options.header, row_kind, features)
+        return (
+            options.labels,
+            options.channels,
+            options.header,
+            row_kind,
+            features,
+            options.episode_columns,
+        )
     if kind is InputKind.RECORDING:
         return ()
     robot = options.robot
@@ -285,6 +351,7 @@ def _table(path: Path, options: InputOptions) -> Read:
         row_kind=options.row_kind,
         features=options.features,
         channels=options.channels,
+        episode_columns=options.episode_columns,
     )
 
 

@@ -79,7 +79,7 @@ _BYTE_ORDER_MARK = "\ufeff"
 _JSON = ("{", "[{")
 
 #: A cell of a line that is drawn, as below the names of a table in Markdown.
-_RULED = re.compile(r"(?::?-+:?|=+)?")
+_RULED = re.compile(r"(?::?-+:?|=+|[-+]+)?")
 _BRACKETED = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
 
 

@@ -115,6 +115,8 @@ class _RobotFeed(Feed):
     decoders: dict[Topic, Callable[[bytes], object]]
     topics: dict[Topic, BoundTopic]
     readers: dict[str, FeatureReader] = field(default_factory=dict)
+    lacking: dict[str, None] = field(default_factory=dict)
+    """What messages should have and do not, as sentences."""
     unstamped: Counter[str] = field(default_factory=Counter)
     """Messages whose headers should tell their times and do not, by topic."""
     _taking: dict[Topic, _Taking] = field(init=False)
@@ -138,6 +140,7 @@ class _RobotFeed(Feed):
                 "headers (0): leave out 'stamp: header' there, or have their publisher fill it in"
                 for topic, count in sorted(self.unstamped.items())
             ),
+            *self.lacking,
             *super(_RobotFeed, self).notes(),
         )
 
@@ -171,6 +174,8 @@ class _RobotFeed(Feed):
                     rows += self.builder.act(stamp, channel, label)
                 except BadMessageError as err:
                     refused = err
+        if labellers:
+            self.lacking.update(dict.fromkeys(self.topics[topic].lacks()))
         if reader is not None:
             # The state is there whatever becomes of the action.
             rows += self.builder.observe(stamp, name, reader.read(message, stamp))

@@ -77,15 +77,7 @@ class TreeVersions:
         numbered = self._numbered()
         if len(numbered) < 2:
             raise InputError(f"there is no tree before this one in {self._directory}.")
-        try:
-            document = read_text(numbered[-2])
-            accept(document)
-        except StorageError:
-            raise
-        except RebtError as err:
-            raise InputError(
-                f"{numbered[-2]} is not published again: {err} To go back further, remove it."
-            ) from err
+        document = self._accepted(numbered[-2], accept)
         try:
             numbered[-1].rename(numbered[-1].with_suffix(f"{_SUFFIX}{_UNDONE}"))
         except OSError as err:
@@ -94,6 +86,35 @@ class TreeVersions:
                 "tree: name a place where you may write."
             ) from err
         return numbered[-2], document
+
+    def newest(self, accept: Callable[[str], object] = lambda document: None) -> tuple[Path, str]:
+        """The newest one, where none is published; see `go_back`.
+
+        Raises:
+            InputError: There is none, or it cannot be read or is not accepted.
+            StorageError: It cannot be put in place.
+        """
+        numbered = self._numbered()
+        if not numbered:
+            raise InputError(f"there is no tree in {self._directory}.")
+        return numbered[-1], self._accepted(numbered[-1], accept)
+
+    def _accepted(self, path: Path, accept: Callable[[str], object]) -> str:
+        try:
+            document = read_text(path)
+            accept(document)
+        except StorageError:
+            raise
+        except RebtError as err:
+            raise InputError(
+                f"{path} is not published again: {err} To go back further, remove it."
+            ) from err
+        return document
+
+    @property
+    def any(self) -> bool:
+        """Whether there is one."""
+        return bool(self._numbered())
 
     def _numbered(self) -> list[Path]:
         return self._all(_SUFFIX)

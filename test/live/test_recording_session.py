@@ -154,6 +154,48 @@ def test_no_file_is_opened_without_a_row() -> None:
     assert desk.disk.files == []
 
 
+def test_actions_before_the_first_state_are_counted_in_the_answer() -> None:
+    desk = Desk()
+    desk.session.start(0)
+    assert not desk.session.knows("state")
+    desk.session.observe(1, "state", (float("nan"),), ())
+    assert not desk.session.knows("state")
+    desk.session.act(2, "action", "go")
+    desk.session.act(3, "action", "go")
+    early = " 2 actions are left out, which came before the first state."
+    assert desk.session.renew(4) == (
+        False,
+        f"no rows were recorded.{early} A new demonstration has begun.",
+    )
+    desk.session.act(5, "action", "go")
+    desk.session.observe(6, "state", (1.0,), ())
+    assert desk.session.knows("state")
+    desk.session.act(7, "action", "go")
+    assert desk.session.stop(8) == (
+        True,
+        "stopped; recorded 1 row in file. 1 action is left out, which came before the first state.",
+    )
+    desk.session.start(9)
+    desk.session.act(10, "action", "go")
+    assert desk.session.stop(11) == (True, "stopped; recorded 1 row in file.")
+
+
+def test_while_nothing_is_recorded_a_state_without_values_is_not_known() -> None:
+    desk = Desk()
+    for values in ((), (float("inf"),), (1.0, float("nan"))):
+        desk.session.observe(1, "state", values, ())
+        assert not desk.session.knows("state")
+    desk.session.observe(1, "state", (1.0,), ())
+    assert desk.session.knows("state")
+
+
+def test_rows_that_the_disk_refused_are_in_the_answer() -> None:
+    desk = desk_with_state()
+    desk.disk.full = True
+    desk.session.act(2, "action", "go")
+    assert desk.session.stop(3) == (False, "stopped; rows were lost: the disk is full.")
+
+
 def test_what_was_recorded_before_counts_where_nothing_was_since() -> None:
     desk = desk_with_state()
     desk.session.act(2, "action", "go")
@@ -440,7 +482,10 @@ def test_a_takeover_without_rows_leaves_nothing_to_set_aside() -> None:
     assert desk.session.origin is TAKEOVER
     answer = desk.session.fail(3)
     assert answer.success
-    assert answer.message.startswith("no rows were recorded. Now disable the executor,")
+    assert answer.message.startswith(
+        "no rows were recorded. 1 action is left out, which came before the first state. Now "
+        "disable the executor,"
+    )
 
 
 def test_who_ends_a_takeover_after_the_executor_drives_on_is_told_that_it_is_kept() -> None:

@@ -474,3 +474,18 @@ def test_the_topics_are_those_of_state_and_actions() -> None:
     robot: RobotFile = parse_robot_file(some.ROBOT_FILE)
     assert robot.state_topics == ("/odom", "/scan", "/joint_states", "/battery", "/mode")
     assert robot.action_topics == ("/joy",)
+
+
+def test_buttons_and_axes_that_a_joystick_does_not_have_are_told() -> None:
+    source = "{joy: /topic, press: {0: go}, hold: {9: lift, 4: drop}, axes: {2: {0.5: up}}}"
+    robot = parse_robot_file(f"state: {{s: /other.data}}\nactions: {{action: {source}}}", "robot")
+    one = bind(robot, "/topic", "sensor_msgs/msg/Joy", installed).labellers["action"]
+    assert one.lacks == ""
+    one.labels(Joy(buttons=[0] * 5, axes=[0.0] * 3), 0)
+    assert one.lacks == "button 9 (there are 5, from 0)"
+    one.labels(Joy(buttons=[0] * 10, axes=[0.0]), 0)
+    assert one.lacks == "axis 2 (there are 1, from 0)"
+    one.labels(Joy(buttons=[0], axes=[]), 0)
+    assert one.lacks == "button 4, 9 (there are 1, from 0) and axis 2 (there are 0, from 0)"
+    one.labels(Joy(buttons=[0] * 10, axes=[0.0] * 3), 0)
+    assert one.lacks == ""

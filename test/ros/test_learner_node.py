@@ -341,7 +341,21 @@ def test_notes_of_the_learning_are_in_the_answer_and_in_the_log(
         assert answer.success, answer.message
         assert "Note: the rows of channel 'action' are not evenly spaced" in answer.message
         learner.says("[WARN]")
-        learner.says("are not evenly spaced, so that")
+        learner.says("are not evenly spaced, so one row back")
+
+
+def test_a_refusal_has_the_notes_on_what_was_read(domain: int, peer: Peer, tmp_path: Path) -> None:
+    directory = tmp_path / "demonstrations"
+    _record(directory, actions=("go",))
+    [recording] = directory.iterdir()
+    recording.write_bytes(recording.read_bytes()[:-3])
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        answer = peer.call("/learner/relearn")
+        assert not answer.success
+        assert "one action only" in answer.message
+        assert f"Note: {recording.name}: " in answer.message
+        learner.says("[WARN]")
+        learner.says(f"{recording.name}: ")
 
 
 def test_a_learning_process_that_dies_is_replaced(domain: int, peer: Peer, tmp_path: Path) -> None:
@@ -456,7 +470,7 @@ def test_a_tree_that_cannot_be_written_is_not_published(
     with NodeProcess("learner_node", domain, tmp_path, {"output": tmp_path / "blocked"}):
         trees = peer.listen(String, "behavior_tree", LATCHED)
         answer = peer.call("/learner/relearn")
-        assert (answer.success, "cannot be written" in answer.message) == (False, True)
+        assert (answer.success, "nothing can be written to" in answer.message) == (False, True)
         _set(peer, output=str(tmp_path / "learned"))
         assert peer.call("/learner/relearn").success
         assert json.loads((tmp_path / "learned" / "tree.json").read_text())["version"]
@@ -486,6 +500,40 @@ def test_the_tree_before_is_published_again_on_request(
         drawn = (tmp_path / "learned" / "tree.svg").read_text(encoding="utf-8")
         assert drawn == render_svg(loads(heard[0].data))
         assert not peer.call("/learner/rollback").success
+
+
+@pytest.mark.parametrize("broken", ["{", None])
+def test_the_newest_tree_is_published_again_where_the_one_on_disk_is_broken_or_gone(
+    broken: str | None, domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    tree = tmp_path / "learned" / "tree.json"
+    with NodeProcess("learner_node", domain, tmp_path, {"min_agreement": 1.0}) as learner:
+        assert peer.call("/learner/relearn").success
+        assert learner.stop() == 0
+    document = tree.read_text()
+    tree.unlink()
+    if broken is not None:
+        tree.write_text(broken)
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        learner.says("~/rollback")
+        heard = peer.listen(String, "behavior_tree", LATCHED)
+        answer = peer.call("/learner/rollback")
+        assert answer.success, answer.message
+        assert "published the newest tree that was kept" in answer.message
+        _latest(peer, heard, 1)
+        assert heard[0].data == document == tree.read_text()
+        assert not peer.call("/learner/rollback").success
+
+
+def test_without_a_tree_before_nothing_is_said_to_stay(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations", 6)
+    with NodeProcess("learner_node", domain, tmp_path, {"min_agreement": 1.0}):
+        answer = peer.call("/learner/relearn")
+        assert not answer.success
+        assert "it is not published, and there is no tree yet." in answer.message
 
 
 def test_a_tree_that_agrees_too_little_is_held_back_with_the_reason(

@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import robot_bags as some
 from builtin_interfaces.msg import Time
 from executor_examples import GO, READS_X, STOP, Robot, learned, report, where_x_is_small
 from geometry_msgs.msg import Twist
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_processes import LATCHED, NodeProcess, Peer, values_of
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Joy, LaserScan
 from std_msgs.msg import Bool, Float64MultiArray, Int32, String
 
 import rebt_ros
@@ -141,6 +143,22 @@ def test_a_recorder_is_ready_once_it_has_heard_every_topic(
         assert [one.data for one in said] == [False]
         peer.state(0.0)
         peer.wait_until(lambda: [one.data for one in said] == [False, True])
+
+
+def test_a_recorder_that_heard_no_usable_state_is_not_ready_and_says_why(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    latched = peer.node.create_publisher(Float64MultiArray, "state", LATCHED)
+    latched.publish(Float64MultiArray(data=[1.0]))
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT):
+        peer.connect(String, "action")
+        _warns(peer, "recorder", "before this node was there is not received", "/state")
+        ready = peer.listen(Bool, "recorder/ready", LATCHED)
+        latched.publish(Float64MultiArray(data=[float("nan")]))
+        _warns(peer, "recorder", "state topic 'state' sent nan at index 0")
+        assert not any(one.data for one in ready)
+        latched.publish(Float64MultiArray(data=[1.0]))
+        peer.wait_until(lambda: ready and ready[-1].data, what="the recorder to be ready")
 
 
 def test_with_two_learners_all_who_are_concerned_say_so(
@@ -423,3 +441,82 @@ def test_a_tree_of_texts_that_is_published_is_refused(
         publisher = peer.connect(String, "behavior_tree", LATCHED)
         publisher.publish(String(data=tree_of_texts.read_text()))
         executor.says("a behavior tree was refused (there is no tree yet): the tree tests 'color'")
+
+
+_JOY_ROBOT = """\
+state:
+  ahead: {path: "/scan.ranges[-30deg:30deg].@min"}
+  behind: {path: "/scan.ranges[170deg:190deg].@min"}
+actions: {action: {joy: /joy, press: {0: go, 12: stop}, axes: {7: {0.5: back}}}}
+"""
+
+
+def test_a_recorder_says_which_feature_has_no_value_and_which_buttons_are_not_there(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    (tmp_path / "robot.yaml").write_text(_JOY_ROBOT)
+    with NodeProcess("recorder_node", domain, tmp_path, {"robot_file": "robot.yaml"}) as recorder:
+        scans = peer.connect(LaserScan, "/scan")
+        pressed = peer.connect(Joy, "/joy")
+
+        def says() -> bool:
+            scans.publish(some.scan(2.0))
+            pressed.publish(some.joy())
+            status = peer.diagnostics.get("recorder: recording")
+            return status is not None and all(
+                text in status.message
+                for text in (
+                    "feature 'behind' had no value in any message on '/scan'",
+                    "messages on '/joy' do not have button 12 (there are 3, from 0) and axis 7 "
+                    "(there are 2, from 0), which the actions 'action' name",
+                )
+            )
+
+        peer.wait_until(says, what="a warning")
+        assert "'ahead'" not in peer.diagnostics["recorder: recording"].message
+        recorder.says("do not have button 12")
+        assert recorder.stop() == 0
+
+
+def test_an_executor_says_that_it_cannot_hear_who_takes_over_by_the_robot_file(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    commands = "commands: {go: {publish: /lamp, type: std_msgs/msg/Bool, message: {data: true}}}"
+    (tmp_path / "robot.yaml").write_text(f"{_JOY_ROBOT}{commands}\n")
+    peer.node.create_publisher(String, "/joy", 10)
+    parameters = {"robot_file": "robot.yaml", "takeover_timeout": 1.0}
+    with NodeProcess("executor_node", domain, tmp_path, parameters):
+        _warns(peer, "executor", "topic '/joy' must carry sensor_msgs/msg/Joy")
+
+
+@pytest.mark.parametrize(
+    ("node", "parameter", "service", "kind"),
+    [
+        ("learner", "output", "relearn", None),
+        ("recorder", "demonstrations", "record", True),
+    ],
+)
+def test_a_directory_that_cannot_be_written_is_said_at_the_start(
+    node: str,
+    parameter: str,
+    service: str,
+    kind: bool | None,
+    domain: int,
+    peer: Peer,
+    tmp_path: Path,
+) -> None:
+    blocked = tmp_path / "blocked"
+    blocked.write_text("a file where a directory should be")
+    wanted = f"nothing can be written to {blocked}/there ({blocked}: Not a directory)"
+    with NodeProcess(f"{node}_node", domain, tmp_path, {parameter: f"{blocked}/there"}) as process:
+        process.says(wanted)
+        _warns(peer, node, wanted)
+        blocked.unlink()
+        peer.wait_until(
+            lambda: not any("nothing can" in one.message for one in peer.diagnostics.values()),
+            what="no warning",
+        )
+        assert not blocked.exists()
+        blocked.write_text("again")
+        answer = peer.call(f"/{node}/{service}", *([kind] if kind is not None else []))
+        assert (answer.success, wanted in answer.message) == (False, True)

@@ -266,8 +266,20 @@ BAD = {
     "inf": (Message(4, "/state", (0.0, float("inf"))), "inf at index 1"),
     "length": (Message(4, "/state", (1.0,)), "1 values where 2 were expected"),
     "empty": (Message(4, "/state", ()), "without values"),
+    "empty, as ROS 2 writes it": (
+        Message(4, "/state", bytes.fromhex("0001000000000000000000000000000079000000")),
+        "without values",
+    ),
     "bytes": (Message(4, "/state", b"\x00\x01\x00\x00\xff\xff"), "cannot be decoded"),
 }
+
+
+def test_the_only_message_of_a_state_is_noted(tmp_path):
+    actions = [Message(10 * place, "/action", "go") for place in range(2, 9)]
+    path = write_bag(tmp_path / "run", [Message(1, "/state", (1.0,)), *actions])
+    assert read_bag(path).notes == (
+        "'/state' has a single message, whose values are the state of all rows",
+    )
 
 
 @pytest.mark.parametrize("bad", BAD)

@@ -122,6 +122,21 @@ def test_what_is_something_else_is_named_with_what_helps(tmp_path, begin, why, n
         load([tmp_path / name])
 
 
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("a.xlsx", "is a spreadsheet: save the table as CSV"),
+        ("a.ODS", "is a spreadsheet"),
+        ("a.npz", "is an archive of NumPy arrays"),
+        ("a.zip", "unzip"),
+    ],
+)
+def test_what_a_zip_archive_is_its_name_says(tmp_path: Path, name: str, why: str) -> None:
+    (tmp_path / name).write_bytes(b"PK\x03\x04\x14\0")
+    with pytest.raises(InputError, match=why):
+        load([tmp_path / name])
+
+
 def _damaged(directory: Path) -> str:
     path = write_recording(directory)
     path.write_bytes(b"?" + path.read_bytes()[1:])

@@ -199,6 +199,10 @@ DIALECTS: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
         _written([["---"] * 5, *_plain(), ["==="] * 5]),
         ("2 lines are ruled lines",),
     ),
+    "a table of psql": (
+        "\n".join([" | ".join(NAMES), "+".join(["---"] * 5), *map(" | ".join, _plain())]),
+        ("separated by bars", "1 line is a ruled line"),
+    ),
     "a table of Markdown": (
         "\n".join(f"| {' | '.join(row)} |" for row in [NAMES, [":--:"] * 5, *_plain()]),
         ("separated by bars", "1 line is a ruled line", "blanks around actions"),
@@ -514,8 +518,20 @@ def test_what_says_to_which_demonstration_a_row_belongs_is_no_feature(
     read = _read(tmp_path, _written(rows, [name, "x", "a"]))
     assert [feature.name for feature in read.demonstration.features] == ["x"]
     [note] = read.notes
-    assert "says to which demonstration a row belongs and is no feature" in note
-    assert ("write each to a table of its own" in note) == (cells != "7,7,7,7,7")
+    if cells == "7,7,7,7,7":
+        assert (
+            note == f"column {name!r} says to which demonstration a row belongs and is no feature"
+        )
+        assert read.demonstrations() == (read.demonstration,)
+    else:
+        values = list(dict.fromkeys(cells.split(",")))
+        assert note == (
+            f"column {name!r} splits the rows into 3 demonstrations, {values[0]!r} to "
+            f"{values[-1]!r}, and is no feature"
+        )
+        shown = read.demonstrations()
+        assert [one.name.partition("#")[2] for one in shown] == values
+        assert [len(one) for one in shown] == [cells.split(",").count(one) for one in values]
 
 
 @pytest.mark.parametrize(
@@ -749,3 +765,84 @@ def test_so_many_texts_are_no_feature_that_memory_stays_linear(tmp_path: Path) -
     read = _read(tmp_path, _written(rows, ["x", "c", "a"]))
     assert [one.name for one in read.demonstration.features] == ["x"]
     assert any("'c' holds 1500 different texts" in note for note in read.notes)
+
+
+def _merged(*rows: str) -> str:
+    return "\n".join(("t,x,door,action", *rows)) + "\n"
+
+
+def test_where_topics_have_rows_of_their_own_the_state_above_an_action_counts(
+    tmp_path: Path,
+) -> None:
+    text = _merged("0,1,,", "1,,open,", "2,,,go", "3,2,,", "4,,,stop", "5,,shut,", "6,,,go")
+    read = _read(tmp_path, text)
+    assert [feature.name for feature in read.demonstration.features] == ["x", "door"]
+    assert read.demonstration.states.tolist() == [[1, 0], [2, 0], [2, 1]]
+    assert "has the last values above it of 'x', 'door'" in " ".join(read.notes)
+    assert not any("is empty" in note for note in read.notes)
+    # Before the first one there is none.
+    early = _read(tmp_path, _merged("0,,,go", "1,1,open,", "2,,,stop", "3,,,go"))
+    assert np.isnan(early.demonstration.states[0]).all()
+    # A row with both tells that empty cells are missing values.
+    both = _read(tmp_path, _merged("0,1,,", "1,,open,", "2,3,,go", "3,2,,", "4,,,stop"))
+    assert both.demonstration.states[0].tolist()[:2] == [2, 3]
+    assert not any("last values above" in note for note in both.notes)
+
+
+@pytest.mark.parametrize(
+    ("stamps", "said", "first"),
+    [
+        ((1_700_000_000, 1_700_000_002), "seconds since 1970", 1_700_000_000_000_000_000),
+        ((1_700_000_000_000,), "milliseconds since 1970", 1_700_000_000_000_000_000),
+        ((1_700_000_000_000_000,), "microseconds since 1970", 1_700_000_000_000_000_000),
+        ((1_700_000_000_000_000_000,), "", 1_700_000_000_000_000_000),
+        ((0, 1_700_000_000), "", 0),
+        ((5, 6, 7), "", 5),
+    ],
+)
+def test_stamps_are_read_in_the_unit_that_their_size_says(
+    stamps: tuple[int, ...], said: str, first: int, tmp_path: Path
+) -> None:
+    rows = [[str(stamp), str(place), "go"] for place, stamp in enumerate(stamps)]
+    read = _read(tmp_path, _written(rows, ["stamp", "x", "a"]))
+    assert read.demonstration.stamps[0] == first
+    assert list(read.notes) == ([f"column 'stamp' is read as {said}"] if said else [])
+
+
+def test_stamps_that_fall_are_noted_but_not_where_a_demonstration_begins(tmp_path: Path) -> None:
+    def notes(name: str) -> list[str]:
+        rows = [[str(e), str(t), str(t % 2), "go"] for e in range(3) for t in (0, 2, 4)]
+        read = _read(tmp_path, _written(rows, [name, "stamp", "x", "a"]))
+        return [one for one in read.notes if "falls" in one]
+
+    assert notes("episode") == []
+    [note] = notes("y")
+    assert note.startswith("column 'stamp' falls 2 times from a row to the next")
+
+
+@pytest.mark.parametrize("label", ["action", "cmd"])
+def test_what_says_the_action_in_other_words_is_no_feature(label: str, tmp_path: Path) -> None:
+    rows = [[str(x), str(x % 3), "abc"[x % 3], "abc"[x % 3]] for x in range(9)]
+    read = _read(tmp_path, _written(rows, ["x", f"{label}_id", "command", label]))
+    # What a person commanded may well be what the robot acts by.
+    assert [feature.name for feature in read.demonstration.features] == ["x", "command"]
+    assert f"column '{label}_id' says what the action is and is no feature" in read.notes
+    rows[0][1] = "2"
+    read = _read(tmp_path, _written(rows, ["x", f"{label}_id", "command", label]))
+    assert [one.name for one in read.demonstration.features] == ["x", f"{label}_id", "command"]
+
+
+def test_a_column_for_each_action_is_noted(tmp_path: Path) -> None:
+    rows = [[str(x), *(str(int(x % 3 == one)) for one in range(3))] for x in range(9)]
+    [note, *_] = _read(tmp_path, _written(rows, ["x", "go", "turn", "stop"])).notes
+    assert note.startswith("each row has a single 1 in 'go', 'turn', 'stop', of which the last is")
+    rows[0][1] = "0"
+    notes = _read(tmp_path, _written(rows, ["x", "go", "turn", "stop"])).notes
+    assert not any("single 1" in note for note in notes)
+
+
+def test_what_is_known_after_the_action_is_noted(tmp_path: Path) -> None:
+    rows = [[str(x), str(x % 2), str(x % 4), "go"] for x in range(9)]
+    notes = _read(tmp_path, _written(rows, ["x", "reward", "next_x", "a"])).notes
+    assert [note.split("'")[1] for note in notes] == ["reward", "next_x"]
+    assert all("known only after the action" in note for note in notes)

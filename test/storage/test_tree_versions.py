@@ -30,6 +30,25 @@ def test_the_tree_before_comes_back_however_often_it_is_asked_for(tmp_path: Path
     }
 
 
+def test_the_newest_tree_is_there_where_none_is_published(tmp_path: Path) -> None:
+    versions = TreeVersions(tmp_path / "trees", 5)
+    assert not versions.any
+    with pytest.raises(InputError, match="there is no tree in"):
+        versions.newest()
+    for document in ("one", "two"):
+        versions.keep(document)
+    assert versions.any
+    assert versions.newest() == (tmp_path / "trees" / "000002.json", "two")
+    assert versions.go_back()[1] == "one"
+    assert versions.newest()[1] == "one"
+
+    def refuse(document: str) -> None:
+        raise InputError(f"{document} breaks a rule.")
+
+    with pytest.raises(InputError, match=r"000001.json is not published again: one breaks a rule"):
+        versions.newest(refuse)
+
+
 def test_only_the_newest_trees_are_kept(tmp_path: Path) -> None:
     versions = TreeVersions(tmp_path, 3)
     for number in range(10):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -17,6 +17,7 @@ from rebt_ros.ros.command_channels import CommandChannels
 from rebt_ros.ros.executor.driving import Driving
 from rebt_ros.ros.executor.robot_commands import RobotCommands
 from rebt_ros.ros.executor.settings import ExecutorSettings
+from rebt_ros.ros.graph_watch import Finding
 from rebt_ros.ros.quiet_events import create_subscription
 from rebt_ros.ros.robot_files import RobotTopics
 
@@ -58,6 +59,14 @@ class Persons:
         """Looks at who publishes; to be called every now and then."""
         if self._topics is not None:
             self._topics.look()
+
+    def problems(self) -> Iterator[Finding]:
+        """What keeps a person from being heard; nobody need be there."""
+        if self._topics is None:
+            return
+        yield from (one for one in self._topics.look() if not one.waits)
+        for topic in self._topics.bound.values():
+            yield from (Finding(one, waits=False) for one in topic.lacks())
 
     def _topics_of_robot(
         self, settings: ExecutorSettings, commands: RobotCommands | None

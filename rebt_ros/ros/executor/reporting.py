@@ -170,6 +170,7 @@ class Reporting:
             ),
             # Whoever takes over must be heard.
             *watch.misfits([intake.documents, *self._persons.subscriptions]),
+            *self._persons.problems(),
             *self._topics.look(),
             *(
                 finding

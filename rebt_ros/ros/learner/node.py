@@ -42,11 +42,14 @@ from rebt_ros.storage.atomic import write_text_atomically
 from rebt_ros.storage.shared_directory import SharedDirectory, Use
 from rebt_ros.storage.tree_file import find_tree
 from rebt_ros.storage.tree_versions import TreeVersions
+from rebt_ros.storage.writable import WritableDirectory
 
 #: Who subscribes later gets the latest tree, too.
 TREE_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 _TREE_FILE: Final = "tree.json"
+#: Directory of the trees that were published, beside it.
+_TREES: Final = "trees"
 
 #: One thread learns, one waits for the end of what it cancels, and others answer further calls,
 #: parameters, and diagnostics.
@@ -87,6 +90,8 @@ class LearnerNode(Node):
         self._ended = EndedDemonstrations()
         self._uncounted = ""
         self._sharing = SharedDirectory(Use.TREES)
+        self._writable, self._trees_writable = WritableDirectory(), WritableDirectory()
+        self._watch.say(Finding(one, waits=False) for one in (self._unwritable(),) if one)
         self._count_ended()
         # On the second one an executor follows this learner, whoever else publishes trees.
         self._tree_publishers = [
@@ -166,7 +171,9 @@ class LearnerNode(Node):
             response.message = str(err)
             self._end(Level.OK, response.message)
         except RebtError as err:
-            response.message = str(err)
+            notes = err.notes if isinstance(err, LearningError) else ()
+            self._log(notes)
+            response.message = f"{err}{_in_short(notes)}"
             self._end(Level.WARN, response.message)
         except Exception as err:
             # The node lives on.  Once its context is shut down, all that rclpy does raises.
@@ -194,6 +201,8 @@ class LearnerNode(Node):
 
     def _learn(self, call: _Call) -> str:
         """Learns, writes and publishes; returns what a person wants to know."""
+        if why := self._unwritable():
+            raise LearningError(f"nothing was learned: {why}.")
         self._ended.learn()
         request = self._settings.request(dumps(self._learned) if self._learned else "")
         path = self._settings.output() / _TREE_FILE
@@ -203,8 +212,7 @@ class LearnerNode(Node):
             limit=self._settings.timeout() or None,
             progress=lambda progress: self._note(call, progress),
         )
-        for note in lesson.notes:
-            self.get_logger().warning(f"{note}.")
+        self._log(lesson.notes)
         learned = loads(lesson.document)
         self._hold_back(lesson)
         unjudged = (
@@ -224,6 +232,10 @@ class LearnerNode(Node):
             f"{lesson.sentence} It is published and in {path}.{unjudged}{_in_short(lesson.notes)}"
         )
 
+    def _log(self, notes: Sequence[str]) -> None:
+        for note in notes:
+            self.get_logger().warning(f"{note}.")
+
     def _write_files(self, directory: Path) -> None:
         """Writes what the command `learn` writes."""
         try:
@@ -233,8 +245,7 @@ class LearnerNode(Node):
             if self.context.ok():
                 self.get_logger().warning(f"not all files of the tree were written: {err}")
             return
-        for note in notes:
-            self.get_logger().warning(f"{note}.")
+        self._log(notes)
         self.get_logger().info(f"summary and pictures of the tree are in {directory.absolute()}.")
 
     def _hold_back(self, lesson: Lesson) -> None:
@@ -244,16 +255,20 @@ class LearnerNode(Node):
             LearningError: It agrees too little with the rows that were held out.
         """
         least, agreement = self._settings.least_agreement(), lesson.agreement
-        stays = "it is not published, and the tree before it stays."
+        before = "the tree before it stays" if self._learned else "there is no tree yet"
+        stays = f"it is not published, and {before}."
         if least and (agreement is None or agreement < least):
             told = "with no held-out rows" if agreement is None else f"with {agreement:.1%} of them"
             raise LearningError(
                 f"{lesson.sentence} It agrees {told}, and min_agreement is {least:.1%}: {stays}"
+                f"{_in_short(lesson.notes)}"
             )
         if lesson.rival is not None and (agreement is None or agreement < lesson.rival):
             raise LearningError(
                 f"{lesson.sentence} The published tree agrees with {lesson.rival:.1%} of the same "
-                f"held-out rows, and keep_if_better is set: {stays}"
+                f"held-out rows, some of which it may have been learned from, and keep_if_better "
+                f"is set: {stays} To publish it all the same, unset keep_if_better and call again."
+                f"{_in_short(lesson.notes)}"
             )
 
     def _unruled(self) -> str:
@@ -264,6 +279,13 @@ class LearnerNode(Node):
                 return f"rules_file {file} is not there, so that no tree is published"
         except (RebtError, OSError, ValueError) as err:
             return f"rules_file cannot be read ({err}), so that no tree is published"
+        return ""
+
+    def _unwritable(self) -> str:
+        """Why no tree can be written, without a full stop; else empty."""
+        with suppress(RebtError):
+            output = self._settings.output()
+            return self._writable.why_not(output) or self._trees_writable.why_not(output / _TREES)
         return ""
 
     def _shared(self) -> str:
@@ -289,16 +311,19 @@ class LearnerNode(Node):
         return learned
 
     def _versions(self) -> TreeVersions:
-        return TreeVersions(self._settings.output() / "trees", self._settings.kept_trees())
+        return TreeVersions(self._settings.output() / _TREES, self._settings.kept_trees())
 
     def _rollback(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Publishes the tree before."""
+        """Publishes the tree before; where none is published, the newest one that was."""
         with self._lock:
             if self._call is not None:
                 response.message = f"busy: {self._call}; call again when that is done."
                 return response
+            what = "the tree before" if self._learned else "the newest tree that was kept"
             try:
-                path, document = self._versions().go_back(self._put_in_place)
+                versions = self._versions()
+                step = versions.go_back if self._learned else versions.newest
+                path, document = step(self._put_in_place)
                 learned = loads(document)
             except (RebtError, OSError) as err:
                 response.message = str(err)
@@ -307,7 +332,7 @@ class LearnerNode(Node):
             self._publish(learned, document)
         self._draw(document)
         response.success = True
-        response.message = f"published the tree before, {path}."
+        response.message = f"published {what}, {path}."
         self._last = Report(Level.OK, response.message)
         self.get_logger().info(response.message)
         return response
@@ -400,13 +425,19 @@ class LearnerNode(Node):
             if learned is not None:
                 self._keeping_rules(learned)
         except RebtError as err:
-            self._last = Report(Level.WARN, f"the tree on disk is not published: {err}")
+            helps = (
+                " ~/rollback publishes the newest tree that was kept."
+                if self._versions().any
+                else ""
+            )
+            self._last = Report(Level.WARN, f"the tree on disk is not published: {err}{helps}")
             self.get_logger().warning(self._last.message)
             return
         if learned is None:
+            kept = ", or ~/rollback for the newest that was kept" if self._versions().any else ""
             self.get_logger().info(
                 f"there is no tree in {path.absolute()} yet: call ~/relearn to learn one from "
-                f"{self._settings.demonstrations().absolute()}."
+                f"{self._settings.demonstrations().absolute()}{kept}."
             )
             return
         self._publish(learned, dumps(learned))
@@ -463,7 +494,7 @@ class LearnerNode(Node):
             "trees",
             "executors without a parameter 'learner' follow one by chance; stop all but one",
         )
-        said = (self._uncounted, self._unruled(), self._shared())
+        said = (self._uncounted, self._unruled(), self._unwritable(), self._shared())
         unfit = [Finding(one, waits=False) for one in said if one]
         problems = self._watch.say([*several, *unfit])
         if problems:

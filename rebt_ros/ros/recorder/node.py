@@ -27,6 +27,7 @@ from rebt_ros.live.arrival import LAST, ArrivalOrder
 from rebt_ros.live.recording_session import NOT_HEARD, WRITE_ERROR, Answer, RecordingSession, Writer
 from rebt_ros.live.state_streams import StateStreams
 from rebt_ros.live.traffic import Traffic
+from rebt_ros.live.values_seen import ValuesSeen
 from rebt_ros.robot_file.binding import BoundTopic
 from rebt_ros.robot_file.features import FeatureReader, described
 from rebt_ros.ros import lifetime
@@ -40,6 +41,7 @@ from rebt_ros.ros.robot_files import RobotTopics
 from rebt_ros.storage.recording import RecordingWriter
 from rebt_ros.storage.recording_head import Origin
 from rebt_ros.storage.shared_directory import SharedDirectory, Use
+from rebt_ros.storage.writable import WritableDirectory
 
 #: Long enough that no message of a burst is lost while the disk is slow.
 _QUEUE: Final = 5000
@@ -115,6 +117,8 @@ class RecorderNode(Node):
         self._robot: RobotTopics | None = None
         self._readers: dict[str, FeatureReader] = {}
         self._categories: dict[str, Categories] = {}
+        self._seen = ValuesSeen({topic.name: topic.fields for topic in settings.state_topics})
+        self._writable = WritableDirectory()
         self._shown = self._listen_to_demonstrator()
         self._driven = self._listen_to_executor()
         self._sources = [*self._shown, *self._driven]
@@ -153,6 +157,7 @@ class RecorderNode(Node):
                 clock=steady,
             )
         self._diagnostics = Diagnostics(self, "recording", self._report)
+        self._watch.say(self._unwritable())
         if settings.recording:
             self._session.start(self._stamp(time.time_ns()))
         self.get_logger().info(
@@ -309,6 +314,7 @@ class RecorderNode(Node):
         if sent is not None:
             self._streams.take(topic, sent, time.monotonic_ns())
         values, stamp = reader.read(message, place), self._stamp(place)
+        self._seen.take(topic, values)
         self._queue(place, partial(self._session.observe, stamp, topic, values, (), sent))
 
     def _on_state(self, topic: str, message: Float64MultiArray, info: dict[str, Any]) -> None:
@@ -384,7 +390,7 @@ class RecorderNode(Node):
         unheard = [
             name
             for name in self._settings.sources
-            if not (self._traffic.heard(name) if name in states else name in connected)
+            if not (self._session.knows(name) if name in states else name in connected)
         ]
         return [*unheard, "/clock"] if simulated_time(self) == 0 else unheard
 
@@ -392,17 +398,28 @@ class RecorderNode(Node):
         """What in the graph keeps this node from recording."""
         watch = self._watch
         unfit = self._robot.look() if self._robot is not None else []
+        bound = self._robot.bound.values() if self._robot is not None else ()
+        valueless = self._seen.lacking() if self._robot is not None else ()
         states = {self.resolve_topic_name(topic.name) for topic in self._settings.state_topics}
         # With a robot file several nodes may well publish, each a part of the state.
         plain = [one for one in self._shown if one.topic_name in states]
+        known = {
+            self.resolve_topic_name(topic.name)
+            for topic in self._settings.state_topics
+            if self._session.knows(topic.name)
+        }
         return watch.say(
             [
                 *watch.timeless(),
                 *unfit,
                 *watch.unheard(self._demonstrators),
                 *watch.mixed(plain),
+                *watch.latched(one for one in plain if one.topic_name not in known),
                 *watch.misfits(self._driven),
+                *(Finding(one, waits=False) for topic in bound for one in topic.lacks()),
+                *(Finding(one, waits=True) for one in valueless),
                 *self._shared(),
+                *self._unwritable(),
             ]
         )
 
@@ -415,6 +432,11 @@ class RecorderNode(Node):
                 "learned from twice; stop it, or give each a directory of its own",
                 waits=False,
             )
+
+    def _unwritable(self) -> Iterator[Finding]:
+        """That no recording can be written."""
+        if why := self._writable.why_not(self._settings.demonstrations):
+            yield Finding(why, waits=False)
 
     async def _serve(
         self, command: Callable[[Any, int], Answer], request: Any, response: Any
@@ -435,6 +457,8 @@ class RecorderNode(Node):
     def _record(self, request: SetBool.Request, stamp: int) -> Answer:
         if not request.data:
             return self._session.stop(stamp)
+        if why := self._writable.why_not(self._settings.demonstrations):
+            return Answer(False, f"not recording: {why}.")
         return self._with_what_is_missing(self._session.start(stamp))
 
     def _renew(self, _: Trigger.Request, stamp: int) -> Answer:
