@@ -115,6 +115,7 @@ HOMES: Final = {
     "pyeda": ("rebt_ros.logic.minimize",),
     "rosbags": ("rebt_ros.storage", "rebt_ros.storage.*"),
     "scipy": (
+        "rebt_ros.learning.mistakes",
         "rebt_ros.study.edit_distance.integer_program",
         "rebt_ros.study.edit_distance.relaxation",
         "rebt_ros.verification.linear_bounds",

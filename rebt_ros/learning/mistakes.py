@@ -6,6 +6,9 @@ after.  Such rows are left out, and the row after one follows the action that wa
 they teach that a held action may end anywhere, and a tree that tests the previous action cannot be
 learned from few demonstrations with mistakes.
 
+Whoever slips may do anything.  If brief actions out of line are nearly always the same few, such as
+dropping a part between driving there and back, they are meant, and none is a mistake.
+
 The mistakes depend on the explanation, and the explanation on the mistakes.  So the remaining rows
 are explained repeatedly, until mistakes recur.  The round with the fewest leaves, exceptions and
 mistakes in total counts.  If that is no fewer than without mistakes, there are none.
@@ -30,6 +33,8 @@ _MOST_ROWS_HELD = 2
 _MOST_LOST = 0.5
 #: With fewer rows per leaf and exception, the size of an explanation says nothing.
 _LEAST_ROWS_EACH = 5
+#: Slips into any action are distributed as unevenly as this in one of so many tables.
+_UNLIKELY = 1 / 100
 #: Maximum number of rows of a table, and of explanations after the first.
 _MOST_ROWS, _MOST_ROUNDS = 5_000, 5
 
@@ -56,17 +61,19 @@ def intended_actions(table: DemonstrationTable) -> IntArray:
     brief = (held <= _MOST_ROWS_HELD) & (after != NO_ACTION)
     intended, least = chosen, 0
     made = [chosen]
+    spared = np.zeros(len(table.actions), dtype=bool)
     for _ in range(_MOST_ROUNDS + 1):
         meant = made[-1]
         explanation = fit(without_mistakes(table, meant), _WITH_PREVIOUS)
         size = explanation.explanation + int(np.count_nonzero(meant != chosen))
         if meant is chosen and len(table) < _LEAST_ROWS_EACH * size:
             break
-        if meant is chosen or size < least:
+        if meant is chosen or (size < least and _may_be_slips(table, meant, spared)):
             intended, least = meant, size
         explained = explanation.explained(_following(table, meant))
         mistaken = brief & (explained != chosen) & ((explained == before) | (explained == after))
-        meant = np.where(_without_lost_actions(mistaken, table), explained, chosen)
+        spared = _lost_actions(mistaken, table)
+        meant = np.where(mistaken & ~spared[chosen], explained, chosen)
         if any(np.array_equal(meant != chosen, other != chosen) for other in made):
             break
         made.append(meant)
@@ -91,10 +98,34 @@ def _following(table: DemonstrationTable, intended: IntArray) -> DemonstrationTa
     return replace(table, previous=previous_actions(intended, table.demonstration))
 
 
-def _without_lost_actions(mistaken: BoolArray, table: DemonstrationTable) -> BoolArray:
+def _lost_actions(mistaken: BoolArray, table: DemonstrationTable) -> BoolArray:
+    """The actions that would lose most of their rows, shape (actions,)."""
     shown = np.bincount(table.chosen, minlength=len(table.actions))
     lost = np.bincount(table.chosen[mistaken], minlength=len(table.actions))
-    return np.asarray(mistaken & (lost <= _MOST_LOST * shown)[table.chosen])
+    return np.asarray(lost > _MOST_LOST * shown)
+
+
+def _may_be_slips(table: DemonstrationTable, meant: IntArray, spared: BoolArray) -> bool:
+    """Whether mistakes are spread over the actions as slips are, by a chi-squared test.
+
+    Args:
+        table: All rows.
+        meant: The action that was meant in each row.
+        spared: Actions whose rows are no mistakes, shape (actions,).
+    """
+    from scipy.special import chdtrc
+
+    mistaken = meant != table.chosen
+    actions = len(table.actions)
+    of_each = np.bincount(meant[mistaken], minlength=actions)
+    # Each slips into one of the other actions.
+    possible = ~spared & ~np.eye(actions, dtype=bool)
+    others = np.maximum(possible.sum(axis=1, keepdims=True), 1)
+    expected = of_each @ (possible / others)
+    found = np.bincount(table.chosen[mistaken], minlength=actions)
+    there = expected > 0
+    uneven = float(np.sum((found - expected)[there] ** 2 / expected[there]))
+    return bool(chdtrc(max(np.count_nonzero(there) - 1, 1), uneven) >= _UNLIKELY)
 
 
 def _held(table: DemonstrationTable) -> tuple[IntArray, IntArray, IntArray]:

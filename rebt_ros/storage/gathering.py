@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final
 
 from rebt_ros.demonstration.large_arrays import Spool
@@ -174,15 +177,25 @@ def _by_workers(
 
     plan = options.plan
     plain = replace(options, plan=ReadingPlan(cache=plan.cache))
-    tasks = [(place, sources[place], reading, plain, keys.get(place)) for place in places]
+    here = Path.cwd()
+    tasks = [(place, sources[place], reading, plain, keys.get(place), here) for place in places]
     jobs = -1 if plan.jobs is None else plan.jobs
     return run_all(_fetched, tasks, jobs, plan.scheduler, batch="auto")
 
 
 def _fetched(
-    place: int, source: Source, reading: Reading, options: InputOptions, key: str | None
+    place: int,
+    source: Source,
+    reading: Reading,
+    options: InputOptions,
+    key: str | None,
+    here: Path,
 ) -> _Fetched:
     """Reads an input in a worker, which leaves it in the cache as a rule."""
+    # A worker that was started for an earlier call may stand in another directory, and one on
+    # another machine may not have this one.
+    with suppress(OSError):
+        os.chdir(here)
     directory = options.plan.cache
     cache = None if directory is None else ReadCache(directory)
     if cache is not None and key is None:

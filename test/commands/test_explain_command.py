@@ -60,7 +60,7 @@ def test_changes_of_single_features_are_the_same_where_branches_overlap_too_much
     whole = explaining.sweep
 
     def limited(*arguments: object) -> Sweep:
-        return whole(*arguments, most=3 if len(arguments) > 4 else 0)
+        return whole(*arguments, most=6 if len(arguments) > 4 else 0)
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(explaining, "sweep", limited)

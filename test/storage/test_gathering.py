@@ -275,6 +275,20 @@ def test_processes_give_the_same_with_a_cache_and_without(fleet: Path, tmp_path:
     assert_equal(loaded(fleet, jobs=2, cache=cache), loaded(fleet))
 
 
+def test_processes_of_an_earlier_call_follow_into_another_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = [Path("0.csv"), Path("1.csv")]
+    for action in ("go", "stop"):
+        directory = tmp_path / action
+        directory.mkdir()
+        monkeypatch.chdir(directory)
+        for path in paths:
+            path.write_text(f"x,action\n1,{action}\n2,{action}\n")
+        read = load(paths, InputOptions(plan=ReadingPlan(jobs=2, strict=True)))
+        assert [one.actions for one in read.demonstrations] == [(action,), (action,)]
+
+
 def test_the_order_in_which_answers_come_does_not_matter(
     fleet: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
