@@ -36,7 +36,7 @@ NODES: Final = {
 #: What each is asked for, and what it says to that.
 ASKED: Final[dict[str, tuple[str, dict[str, Any], str]]] = {
     "recorder": ("record", {"on": True}, "recording"),
-    "learner": ("rollback", {}, "there is no tree before this one"),
+    "learner": ("rollback", {}, "there is no tree in "),
     "executor": ("enable", {"on": True}, "enabled"),
 }
 
