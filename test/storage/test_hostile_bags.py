@@ -45,12 +45,12 @@ def bomb() -> bytes:
 
 @contextmanager
 def refused(match: str) -> Iterator[None]:
-    """Within a second, with a sentence."""
+    """Soon, with a sentence."""
     # Of the processor, as a busy machine is no bomb.
     began = time.process_time()
     with pytest.raises(InputError, match=match) as raised:
         yield
-    assert time.process_time() - began < 1.0
+    assert time.process_time() - began < 5.0
     assert str(raised.value).endswith(".")
 
 
@@ -328,7 +328,7 @@ def without_metadata(bag: Path, why: str) -> None:
     """Reads a bag, within a second, with a note that says why its metadata are not."""
     began = time.process_time()
     read = read_bag(bag)
-    assert time.process_time() - began < 1.0
+    assert time.process_time() - began < 5.0
     assert len(read.demonstration)
     (note,) = read.notes
     assert why in note
