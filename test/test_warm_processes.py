@@ -6,6 +6,8 @@ import json
 import os
 import signal
 import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -55,3 +57,48 @@ def test_what_differs_from_its_first_line_on_is_started_as_usual() -> None:
     assert not can_start(as_begun() | {"PYTHONPATH": "/somewhere/else"})
     with pytest.raises(AssertionError, match="starts as usual"):
         run("json.tool", LC_ALL="of nowhere")
+
+
+#: Starts a process that waits for its input, says its number and waits, too.
+_ASKS = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from pathlib import Path
+import warm_processes
+from warm_processes import WarmProcess, as_begun
+warm_processes.use()
+process = WarmProcess("json.tool", [], environment=as_begun(), directory=Path.cwd(),
+                      files=(int(sys.argv[2]), 1, 2), session=True)
+print(process.pid, flush=True)
+sys.stdin.read()
+"""
+
+
+def test_none_is_left_where_whoever_started_it_was_killed() -> None:
+    theirs, ours = os.pipe()
+    # Its input goes on as long as this test.
+    with os.fdopen(ours, "w"), os.fdopen(theirs):
+        with subprocess.Popen(
+            [sys.executable, "-c", _ASKS, str(Path(__file__).parent), str(theirs)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            pass_fds=[theirs],
+        ) as asking:
+            assert asking.stdout is not None
+            number = int(asking.stdout.readline())
+            assert _lives(number)
+            asking.kill()
+        end = time.monotonic() + 60
+        while _lives(number):
+            assert time.monotonic() < end, "it goes on"
+            time.sleep(0.01)
+
+
+def _lives(number: int) -> bool:
+    """Whether a process has not ended, be it that nobody has asked how."""
+    try:
+        state = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"

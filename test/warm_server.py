@@ -117,7 +117,11 @@ def serve(channel: socket.socket, tracing: Tracing) -> dict[str, Any]:
                     continue
                 said, files, _, _ = socket.recv_fds(channel, LARGEST, FILES)
                 if not said:
-                    # Whoever asked has ended.
+                    # Whoever asked has ended, perhaps killed.  A node that goes on would be heard
+                    # by later tests in its domain.
+                    for child in tell:
+                        with contextlib.suppress(ProcessLookupError):
+                            os.kill(child, signal.SIGKILL)
                     os._exit(0)
                 request = json.loads(said)
                 child = _fork(request["blocked"], tracing)
