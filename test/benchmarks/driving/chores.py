@@ -3,52 +3,13 @@
 from __future__ import annotations
 
 import math
-import random
 from typing import ClassVar
 
+from driving.scripted import Scripted
 from driving.task import State
 
 
-class _Chore:
-    """An episode of a task."""
-
-    features: ClassVar[tuple[str, ...]]
-    actions: ClassVar[tuple[str, ...]]
-    most_steps: ClassVar[int]
-    needs_memory = False
-
-    def reset(self, seed: int) -> State:
-        self._chance = random.Random(seed)
-        self._steps = 0
-        self._done = self._failed = False
-        self._begin()
-        return self._state
-
-    def step(self, action: str) -> State:
-        self._steps += 1
-        self._act(action)
-        return self._state
-
-    def _begin(self) -> None:
-        raise NotImplementedError
-
-    def _act(self, action: str) -> None:
-        raise NotImplementedError
-
-    @property
-    def _state(self) -> State:
-        raise NotImplementedError
-
-    @property
-    def over(self) -> bool:
-        return self._done or self._failed or self._steps >= self.most_steps
-
-    @property
-    def success(self) -> bool:
-        return self._done and not self._failed
-
-
-class Pendulum(_Chore):
+class Pendulum(Scripted):
     """Swings a pendulum up, brakes where it has too much energy, and holds it for 40 steps."""
 
     name = "pendulum"
@@ -93,7 +54,7 @@ class Pendulum(_Chore):
         return against_it if energy > 0.3 else with_it
 
 
-class Thermostat(_Chore):
+class Thermostat(Scripted):
     """Heats below 18 degrees, until there are 22, and does not switch all the time."""
 
     name = "thermostat"
@@ -127,7 +88,7 @@ class Thermostat(_Chore):
         return "heat" if self._heats else "off"
 
 
-class Elevator(_Chore):
+class Elevator(Scripted):
     """Calls the elevator, waits, enters, rides to the floor that is wanted, and leaves."""
 
     name = "elevator"
@@ -184,7 +145,7 @@ class Elevator(_Chore):
         return "press" if self._inside else "call"
 
 
-class Sorter(_Chore):
+class Sorter(Scripted):
     """Brings four parts from a belt to the bins of their colors, which stand anywhere."""
 
     name = "sorter"
@@ -223,7 +184,7 @@ class Sorter(_Chore):
         return "drop" if self._place == goal else "right" if goal > self._place else "left"
 
 
-class Crossing(_Chore):
+class Crossing(Scripted):
     """Walks up to a road, and crosses it where the next car takes more than 13 steps to come."""
 
     name = "crossing"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import random
 from typing import ClassVar
 
+from driving.scripted import Scripted
 from driving.task import State
 
 _Point = tuple[float, float]
@@ -23,43 +23,8 @@ def _steering(bearing: float, tolerance: float) -> str:
     return "left" if bearing > 0 else "right"
 
 
-class _Wheels:
-    """A robot with a position and a heading, and an episode of a task."""
-
-    features: ClassVar[tuple[str, ...]]
-    actions: ClassVar[tuple[str, ...]]
-    most_steps: ClassVar[int]
-    needs_memory = False
-
-    def reset(self, seed: int) -> State:
-        self._chance = random.Random(seed)
-        self._steps = 0
-        self._done = self._failed = False
-        self._begin()
-        return self._state
-
-    def step(self, action: str) -> State:
-        self._steps += 1
-        self._act(action)
-        return self._state
-
-    def _begin(self) -> None:
-        raise NotImplementedError
-
-    def _act(self, action: str) -> None:
-        raise NotImplementedError
-
-    @property
-    def _state(self) -> State:
-        raise NotImplementedError
-
-    @property
-    def over(self) -> bool:
-        return self._done or self._failed or self._steps >= self.most_steps
-
-    @property
-    def success(self) -> bool:
-        return self._done and not self._failed
+class _Wheels(Scripted):
+    """A robot with a position and a heading."""
 
     def _stand(self, x: float, y: float, heading: float) -> None:
         self._x, self._y, self._heading = x, y, heading
