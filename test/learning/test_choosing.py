@@ -340,6 +340,25 @@ def test_few_rows_are_reproduced_instead_of_pruned() -> None:
     assert "too few" in policy.reasons[0]
 
 
+def test_few_rows_tell_that_a_task_needs_memory() -> None:
+    # There, and back after a pick.
+    few = table(
+        [0, 1, 2, 2, 1, 0] * 3,
+        ["go", "go", "pick", "back", "back", "back"] * 3,
+        [row // 6 for row in range(18)],
+    )
+    policy = choose(few, LearnOptions())
+    assert policy.levels is None
+    assert policy.fitted.vocabulary.history is History.PREVIOUS
+    assert [reason.split(":")[0] for reason in policy.reasons] == [
+        "The previous action is tested",
+        "18 rows are too few to choose by",
+    ]
+    without = choose(few, LearnOptions(history=History.NONE))
+    assert without.fitted.vocabulary == FEATURES_ALONE
+    assert len(without.reasons) == 1
+
+
 def test_choosing_is_the_same_every_time() -> None:
     first, second = choose(noisy(), LearnOptions()), choose(noisy(), LearnOptions())
     assert first.ccp_alpha == second.ccp_alpha

@@ -60,6 +60,29 @@ def test_where_nobody_errs_there_are_no_mistakes() -> None:
     assert without_mistakes(table, table.chosen) is table
 
 
+def honking(brief: tuple[int, ...]) -> DemonstrationTable:
+    """To and fro after thirty rows of honking, with something else for a row now and then."""
+    moving = to_and_fro(())
+    chosen = np.append(np.full(30, 2), moving.chosen)
+    chosen[30 + np.arange(5, 5 + 9 * len(brief), 9)] = brief
+    return replace(
+        moving,
+        actions=("left", "right", "honk"),
+        states=np.vstack([np.full((30, 1), -5.0), moving.states]),
+        chosen=chosen,
+        demonstration=np.zeros(len(chosen), dtype=np.int64),
+        stamps=np.arange(len(chosen)),
+        previous=None,  # type: ignore[arg-type]
+    )
+
+
+def test_brief_actions_that_are_always_the_same_are_meant() -> None:
+    always = honking((2,) * 12)
+    assert (intended_actions(always) == always.chosen).all()
+    anything = honking((2, 0, 1, 0, 2, 1, 1, 0, 0, 2, 1, 0))
+    assert np.count_nonzero(intended_actions(anything) != anything.chosen) >= 6
+
+
 def test_what_follows_a_mistake_follows_what_was_meant() -> None:
     table = to_and_fro()
     left = without_mistakes(table, intended_actions(table))
