@@ -50,7 +50,7 @@ def relearn(settings: Settings) -> list[Figure]:
         "limit": timed(lambda: DecisionTreeClassifier(random_state=0).fit(matrix, rows.chosen)),
     }
     name = f"relearn, {case.rows:,} x {case.width} / one DecisionTreeClassifier.fit"
-    return [compared(name, alternate(subjects, settings.rounds), 8)]
+    return [compared(name, alternate(subjects, settings.rounds), 3)]
 
 
 def relearn_large(settings: Settings) -> list[Figure]:
