@@ -174,8 +174,8 @@ class _RobotFeed(Feed):
                     rows += self.builder.act(stamp, channel, label)
                 except BadMessageError as err:
                     refused = err
-        if labellers:
-            self.lacking.update(dict.fromkeys(self.topics[topic].lacks()))
+            if labeller.lacks:
+                self.lacking.update(dict.fromkeys(self.topics[topic].lacks()))
         if reader is not None:
             # The state is there whatever becomes of the action.
             rows += self.builder.observe(stamp, name, reader.read(message, stamp))
