@@ -44,13 +44,13 @@ def _printable(character: str) -> str:
     return " " if character.isspace() else ascii(character)[1:-1]
 
 
-def listing(names: Sequence[object], most: int = 8) -> str:
-    """Names in a sentence: separated by commas, and cut off after so many.
+def listing(names: Sequence[object], most: int = 8, separator: str = ", ") -> str:
+    """Names in a sentence: separated, by commas unless said otherwise, and cut off after so many.
 
     >>> listing(["a", "b", "c"]), listing(["a", "b", "c"], most=2), listing([])
     ('a, b, c', 'a, b, …', '')
     """
-    return ", ".join([*map(str, names[:most]), *(["…"] if len(names) > most else [])])
+    return separator.join([*map(str, names[:most]), *(["…"] if len(names) > most else [])])
 
 
 class InputError(RebtError):

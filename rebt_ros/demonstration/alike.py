@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from rebt_ros.demonstration.demonstration import Demonstration
+from rebt_ros.errors import listing
 
 #: What parts words, but not numbers.
 _PARTING = re.compile(r"(?<=[^\W\d_])[\s_-]+(?=[^\W_])|(?<=[^\W_])[\s_-]+(?=[^\W\d_])")
@@ -65,5 +66,4 @@ def _key(label: str) -> object:
 
 
 def _listed(groups: Sequence[Sequence[str]]) -> str:
-    named = "; ".join(" and ".join(map(repr, group)) for group in groups[:_NAMED])
-    return named + ("; …" if len(groups) > _NAMED else "")
+    return listing([" and ".join(map(repr, group)) for group in groups], _NAMED, "; ")
