@@ -152,17 +152,13 @@ class FittedTree:
         counts = self.grown.counts
         return np.asarray(1 + counts.sum(axis=1) - counts.max(axis=1))
 
+    def chosen(self, table: DemonstrationTable) -> IntArray:
+        """What the unpruned tree chooses: positions in ``table.actions``, shape (rows,)."""
+        return np.asarray(self.grown.majority[self.reached(table)])
+
     def right(self, table: DemonstrationTable) -> int:
         """How many rows the unpruned tree predicts."""
         return int(self.hits(table, np.zeros(1)).sum())
-
-    def path_lengths(self, table: DemonstrationTable) -> IntArray:
-        """Splits between the root and the leaf that each row reaches, shape (rows,)."""
-        depth = np.zeros(len(self.path.parents), dtype=np.int64)
-        # Parents come before their children.
-        for node in range(1, len(depth)):
-            depth[node] = depth[self.path.parents[node]] + 1
-        return np.asarray(depth[self.reached(table)])
 
     def at(self, ccp_alpha: float) -> TrainedTree:
         """The tree as pruned at `ccp_alpha`; equal to scikit-learn's own fit with it."""

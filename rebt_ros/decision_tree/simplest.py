@@ -3,11 +3,12 @@
 CART grows a tree greedily.  With few rows, splits that only happen to separate them look as good as
 those that the demonstrator goes by.  Trees grown from random choices of the columns fit the same
 rows; those with the fewest leaves are the simplest explanations (Occam's razor), and generalize
-better.  Of several, the one with the fewest comparisons of numbers is taken: one of many possible
-thresholds is likely to separate rows by chance, while yes and no leave nothing to choose.  Of
-these, it is the one with the longest paths: it separates few rows from the rest at a time, and is
-so most like a list of rules by priority, which is what demonstrators have in mind and what behavior
-trees are.  If none is simpler, the greedy tree stays.
+better.
+
+There are often several of these, which differ in states that nobody showed.  There, all trees that
+fit the rows vote, as in a random forest (Breiman, 2001), and of the smallest trees the one that
+agrees with the vote most often is taken.  The states to vote on take each feature from one of two
+rows.  A split that separates the rows by chance is found by few trees, and loses.
 
 This is for trees that a person could read, with enough rows per leaf.  Large trees approximate
 curved borders by many small steps, whose number says nothing.  And many small trees fit a few rows,
@@ -16,17 +17,22 @@ most of them by chance.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from rebt_ros.arrays import IntArray
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.training import fit_again
 from rebt_ros.demonstration.table import DemonstrationTable
 
 #: Maximum number of leaves and rows for a search.
 _MOST_LEAVES, _MOST_ROWS = 30, 5_000
-_LEAST_ROWS_PER_LEAF = 5
-#: Trees tried for each share of the columns that a split is chosen from.
-_TRIES, _SHARES = 30, (0.3, 0.6, 0.8)
+_LEAST_ROWS_PER_LEAF = 2
+#: Trees tried for each share of the columns that a split is chosen from: as many as fit this many
+#: rows in all, within bounds.
+_ROWS_TO_FIT, _LEAST_TRIES, _MOST_TRIES = 100_000, 30, 100
+_SHARES = (0.3, 0.6, 0.8)
 
 
 def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
@@ -40,19 +46,40 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
     if leaves > _MOST_LEAVES or rows > _MOST_ROWS or rows < _LEAST_ROWS_PER_LEAF * leaves:
         return fitted
     right = fitted.right(table)
-    best, rank = fitted, (fitted.leaves, fitted.comparisons, -np.inf)
-    for number in range(_TRIES):
-        for share in _SHARES:
-            other = fit_again(table, fitted, number, share)
-            # No tree fits rows that contradict each other.
-            if other.leaves <= best.leaves and other.right(table) >= right:
-                its = _rank(table, other)
-                if its < rank:
-                    best, rank = other, its
-    return best
+    tries = min(max(_ROWS_TO_FIT // rows, _LEAST_TRIES), _MOST_TRIES)
+    # No tree fits rows that contradict each other.
+    others = (one for one in fit_again(table, fitted, tries, _SHARES) if one.right(table) >= right)
+    trees = [fitted, *others]
+    fewest = min(one.leaves for one in trees)
+    smallest = [place for place, one in enumerate(trees) if one.leaves == fewest]
+    if len(smallest) == 1:
+        return trees[smallest[0]]
+    unseen = _crossed(table, fitted.random_state)
+    chosen = np.stack([one.chosen(unseen) for one in trees])
+    agreeing = (chosen[smallest] == _vote(chosen, len(table.actions))).sum(axis=1)
+    return trees[smallest[int(np.argmax(agreeing))]]
 
 
-def _rank(table: DemonstrationTable, fitted: FittedTree) -> tuple[int, int, float]:
-    """Lower means simpler."""
-    lengths, weights = fitted.path_lengths(table), table.row_weights
-    return fitted.leaves, fitted.comparisons, -float(np.average(lengths, weights=weights))
+def _vote(chosen: IntArray, actions: int) -> IntArray:
+    """What most trees choose in each state, the first of equals, shape (states,).
+
+    Args:
+        chosen: Positions of actions, shape (trees, states).
+        actions: Number of actions.
+    """
+    votes = np.stack([(chosen == action).sum(axis=0) for action in range(actions)])
+    return np.asarray(np.argmax(votes, axis=0))
+
+
+def _crossed(table: DemonstrationTable, random_state: int) -> DemonstrationTable:
+    """As many states: each feature, and what was done before, is of the row or of any other."""
+    random = np.random.default_rng(random_state)
+    shape = table.states.shape
+
+    def taken(size: tuple[int, ...]) -> IntArray:
+        """Rows to take values from, by features."""
+        own = np.broadcast_to(np.arange(len(table)).reshape(-1, *(1,) * (len(size) - 1)), size)
+        return np.where(random.random(size) < 0.5, random.integers(len(table), size=size), own)
+
+    states = np.take_along_axis(table.states, taken(shape), axis=0)
+    return replace(table, states=states, previous=table.previous[taken(shape[:1])])

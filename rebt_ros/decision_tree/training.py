@@ -78,25 +78,25 @@ def fit(table: DemonstrationTable, options: FitOptions = PLAIN) -> FittedTree:
 
 
 def fit_again(
-    table: DemonstrationTable, fitted: FittedTree, number: int, share: float
-) -> FittedTree:
-    """Another tree for the same rows, whose splits are chosen from random columns.
+    table: DemonstrationTable, fitted: FittedTree, draws: int, shares: Sequence[float]
+) -> Iterator[FittedTree]:
+    """More trees for the same rows, whose splits are chosen from random columns.
 
     Args:
         table: What a tree was fitted to, without made-up rows.
         fitted: That tree, whose options apply.
-        number: Number of the draw.
-        share: Share of the columns that a split is chosen from, in (0, 1].
+        draws: Number of trees for each share.
+        shares: Shares of the columns that a split is chosen from, in (0, 1].
     """
-    options = FitOptions(
-        fitted.vocabulary, fitted.max_depth, fitted.random_state + number, Upsampling.NONE
-    )
-    classifier = options.classifier().set_params(max_features=share)
-    with _quiet():
-        matrix = encode(table, fitted.vocabulary)
-        classifier.fit(matrix, table.chosen, sample_weight=table.row_weights)
-    grown = _grown(classifier, len(fitted.actions))
-    return replace(fitted, grown=grown, path=pruning_path(grown))
+    matrix, weights = encode(table, fitted.vocabulary), table.row_weights
+    for draw in range(draws):
+        options = FitOptions(max_depth=fitted.max_depth, random_state=fitted.random_state + draw)
+        for share in shares:
+            classifier = options.classifier().set_params(max_features=share)
+            with _quiet():
+                classifier.fit(matrix, table.chosen, sample_weight=weights)
+            grown = _grown(classifier, len(fitted.actions))
+            yield replace(fitted, grown=grown, path=pruning_path(grown))
 
 
 def fit_parts(
