@@ -8,7 +8,9 @@ better.
 There are often several of these, which differ in states that nobody showed.  There, all trees that
 fit the rows vote, as in a random forest (Breiman, 2001), and of the smallest trees the one that
 agrees with the vote most often is taken.  The states to vote on take each feature from one of two
-rows.  A split that separates the rows by chance is found by few trees, and loses.
+rows.  A split that separates the rows by chance is found by few trees, and loses.  With each
+comparison of a number, a vote counts half as much: one of many possible thresholds is likely to
+separate rows by chance, while yes and no leave nothing to choose.
 
 This is for trees that a person could read, with enough rows per leaf.  Large trees approximate
 curved borders by many small steps, whose number says nothing.  And many small trees fit a few rows,
@@ -21,7 +23,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rebt_ros.arrays import IntArray
+from rebt_ros.arrays import FloatArray, IntArray
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.training import fit_again
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -56,18 +58,21 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
         return trees[smallest[0]]
     unseen = _crossed(table, fitted.random_state)
     chosen = np.stack([one.chosen(unseen) for one in trees])
-    agreeing = (chosen[smallest] == _vote(chosen, len(table.actions))).sum(axis=1)
+    comparisons = np.array([one.comparisons for one in trees])
+    voted = _vote(chosen, 0.5 ** (comparisons - comparisons.min()), len(table.actions))
+    agreeing = (chosen[smallest] == voted).sum(axis=1)
     return trees[smallest[int(np.argmax(agreeing))]]
 
 
-def _vote(chosen: IntArray, actions: int) -> IntArray:
-    """What most trees choose in each state, the first of equals, shape (states,).
+def _vote(chosen: IntArray, weights: FloatArray, actions: int) -> IntArray:
+    """What most votes choose in each state, the first of equals, shape (states,).
 
     Args:
         chosen: Positions of actions, shape (trees, states).
+        weights: What the vote of each tree counts, shape (trees,).
         actions: Number of actions.
     """
-    votes = np.stack([(chosen == action).sum(axis=0) for action in range(actions)])
+    votes = np.stack([weights @ (chosen == action) for action in range(actions)])
     return np.asarray(np.argmax(votes, axis=0))
 
 

@@ -121,9 +121,9 @@ def choose(
         # If it is pruned, its size before pruning is not what makes it simple.
         if other is not fitted and (asked or _leaves(other, its) <= _leaves(fitted, ccp_alpha)):
             reasons.append(
-                f"Of the trees that fit the rows, the simplest one has {other.leaves} leaves "
-                f"({fitted.leaves} where splits are chosen greedily); of equals, it is the one "
-                "that most often does what most of all these trees do."
+                f"Of the trees that fit the rows, one with {other.leaves} leaves is the simplest "
+                f"({fitted.leaves} where splits are chosen greedily); of those with as few, it "
+                "agrees most often with all these trees."
             )
             fitted, ccp_alpha = other, its
     return ChosenPolicy(fitted, ccp_alpha, psa, levels, (*reasons, reason), judged.of_all)

@@ -525,8 +525,24 @@ def test_a_simpler_tree_than_the_greedy_one_is_found() -> None:
     assert conditions == {"distance", "battery"}
 
 
+def test_of_equally_small_trees_the_one_that_most_votes_agree_with_is_taken() -> None:
+    # Both numbers, and whether it is docked, separate all rows.
+    states = [
+        (0.1 * (1 + row % 3) + 0.5 * side, 0.2 + 0.6 * side, side, 0)
+        for side in (0, 1)
+        for row in range(20)
+    ]
+    table = some.table(states, [2 * int(state[2]) for state in states])
+    greedy = [fit(table, FitOptions(random_state=number)) for number in range(20)]
+    asked = {columns(table, FEATURES_ALONE)[int(one.grown.column[0])] for one in greedy}
+    assert asked == {Number("distance"), Indicator(IsTrue("docked")), Number("battery")}
+    for one in greedy:
+        assert one.leaves == 2
+        assert simplest(table, one).comparisons == 0
+
+
 def test_there_is_no_search_where_a_tree_has_very_many_leaves_or_few_rows_for_each() -> None:
-    few = either_but_not_both(20)
+    few = either_but_not_both(12)
     greedy = fit(few)
     assert greedy.leaves > 4
     assert simplest(few, greedy) is greedy
