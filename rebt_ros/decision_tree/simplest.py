@@ -9,7 +9,7 @@ There are often several of these, which differ in states that nobody showed.  Th
 fit the rows vote, as in a random forest (Breiman, 2001), and of the smallest trees the one that
 agrees with the vote most often is taken.  The states to vote on take each feature from one of two
 rows.  A split that separates the rows by chance is found by few trees, and loses.  With each
-comparison of a number, a vote counts half as much: one of many possible thresholds is likely to
+comparison of a number, a vote counts a quarter as much: one of many possible thresholds is likely to
 separate rows by chance, while yes and no leave nothing to choose.
 
 This is for trees that a person could read, with enough rows per leaf.  Large trees approximate
@@ -59,7 +59,7 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
     unseen = _crossed(table, fitted.random_state)
     chosen = np.stack([one.chosen(unseen) for one in trees])
     comparisons = np.array([one.comparisons for one in trees])
-    voted = _vote(chosen, 0.5 ** (comparisons - comparisons.min()), len(table.actions))
+    voted = _vote(chosen, 0.25 ** (comparisons - comparisons.min()), len(table.actions))
     agreeing = (chosen[smallest] == voted).sum(axis=1)
     return trees[smallest[int(np.argmax(agreeing))]]
 
