@@ -8,9 +8,9 @@ better.
 There are often several of these, which differ in states that nobody showed.  There, all trees that
 fit the rows vote, as in a random forest (Breiman, 2001), and of the smallest trees the one that
 agrees with the vote most often is taken.  The states to vote on take each feature from one of two
-rows.  A split that separates the rows by chance is found by few trees, and loses.  With each
-comparison of a number, a vote counts a quarter as much: one of many possible thresholds is likely to
-separate rows by chance, while yes and no leave nothing to choose.
+rows.  A split that separates the rows by chance is found by few trees, and loses.  Each comparison
+of a number makes a vote count less: one of many possible thresholds is likely to separate rows by
+chance, while yes and no leave nothing to choose.
 
 This is for trees that a person could read, with enough rows per leaf.  Large trees approximate
 curved borders by many small steps, whose number says nothing.  And many small trees fit a few rows,
@@ -35,6 +35,8 @@ _LEAST_ROWS_PER_LEAF = 2
 #: rows in all, within bounds.
 _ROWS_TO_FIT, _LEAST_TRIES, _MOST_TRIES = 100_000, 30, 100
 _SHARES = (0.3, 0.6, 0.8)
+#: What is left of a vote with each comparison of a number.
+_COMPARED = 0.25
 
 
 def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
@@ -59,7 +61,7 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
     unseen = _crossed(table, fitted.random_state)
     chosen = np.stack([one.chosen(unseen) for one in trees])
     comparisons = np.array([one.comparisons for one in trees])
-    voted = _vote(chosen, 0.25 ** (comparisons - comparisons.min()), len(table.actions))
+    voted = _vote(chosen, _COMPARED ** (comparisons - comparisons.min()), len(table.actions))
     agreeing = (chosen[smallest] == voted).sum(axis=1)
     return trees[smallest[int(np.argmax(agreeing))]]
 
