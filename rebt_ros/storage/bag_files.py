@@ -24,11 +24,15 @@ from rebt_ros.storage.bag_safety import check_bag
 from rebt_ros.storage.mcap import MAGIC as MCAP_MAGIC
 from rebt_ros.storage.mcap import McapFile, Survey
 from rebt_ros.storage.packing import unpack_file, without_packing
+from rebt_ros.storage.strangers import refuse_strangers
 from rebt_ros.storage.text import unreadable
 from rebt_ros.storage.time_order import SET_BACK, by_time
 
 #: Suffixes of files that hold a bag's messages, in lower case.
 STORAGE_SUFFIXES: Final = (".mcap", ".db3")
+
+#: Suffixes of packed files that are to be unpacked before they are read.
+_PACKED_OTHERWISE: Final = (".gz", ".bz2", ".xz", ".zip", ".tar", ".7z")
 
 #: How the names of files begin in which macOS keeps what other file systems cannot hold.
 _APPLE: Final = "._"
@@ -53,6 +57,15 @@ def holds_messages(path: Path) -> bool:
     if path.name.startswith(_APPLE):
         return False
     return without_packing(path.name.lower()).endswith(STORAGE_SUFFIXES)
+
+
+def begins_like_messages(path: Path) -> bool:
+    """Whether a file begins as those of messages do, whatever it is called."""
+    if not path.is_file():
+        return False
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        return file.read(len(sqlite.MAGIC)).startswith((MCAP_MAGIC, sqlite.MAGIC))
+    return False
 
 
 def is_bag(directory: Path) -> bool:
@@ -209,7 +222,10 @@ def _unfinished(directory: Path, missing: Sequence[str]) -> str:
     """What is there of missing files under longer names, as while they are copied or written."""
     there = sorted(one.name for one in directory.iterdir())
     found = [one for one in there if any(one.startswith(f"{name}.") for name in missing)]
-    return f", or wait for what writes {', '.join(found)}" if found else ""
+    if not found:
+        return ""
+    packed = all(one.lower().endswith(_PACKED_OTHERWISE) for one in found)
+    return f", or {'unpack' if packed else 'wait for what writes'} {', '.join(found)}"
 
 
 def _open_all(files: Sequence[Path], bag: BagFiles, stack: ExitStack) -> None:
@@ -380,57 +396,6 @@ def explained(path: Path) -> Iterator[None]:
         raise
     except Exception as err:  # of struct, SQLite, zstd, YAML, ...: whatever the bytes provoke
         raise _explanation(path, err) from err
-
-
-_ZIP: Final = b"PK\x03\x04"
-
-#: What zip archives are, by their suffixes, and what helps.
-_ZIPPED: Final = {
-    **dict.fromkeys((".xlsx", ".xlsm", ".ods"), "is a spreadsheet: save the table as CSV"),
-    ".npz": "is an archive of NumPy arrays: write the table as CSV, with a line of column names",
-}
-
-#: How files begin that are no files of messages, what they are, and what helps.
-_STRANGERS: Final[Sequence[tuple[bytes, str]]] = (
-    (
-        b"version https://git-lfs",
-        "is a pointer of Git LFS, not the file itself: run `git lfs pull`",
-    ),
-    (
-        b"#ROSBAG V",
-        "is a bag of ROS 1: convert it with `rosbags-convert --src FILE --dst DIRECTORY`",
-    ),
-    (b"\x1f\x8b", "is packed with gzip: unpack it with `gunzip`"),
-    (_ZIP, "is a zip archive: unpack it with `unzip`"),
-    (b"PAR1", "is a Parquet file: write it as CSV, with pandas for example"),
-    (b"ARROW1", "is an Arrow file: write it as CSV, with pandas for example"),
-    (b"\x89HDF", "is an HDF5 file: write it as CSV, with pandas for example"),
-    (b"\x93NUMPY", "is an array of NumPy: write it as CSV, with a line of column names"),
-    (b"\xd0\xcf\x11\xe0", "is a file of an old Excel or Word: save the table as CSV"),
-    (b"%PDF", "is a PDF file: name the file that it was made of"),
-    (b"\xfd7zXZ", "is packed with xz: unpack it with `unxz`"),
-    (b"BZh", "is packed with bzip2: unpack it with `bunzip2`"),
-    (b"<!DOCTYPE", "is a page of HTML, as a failed download leaves it: download the file itself"),
-    (b"<html", "is a page of HTML, as a failed download leaves it: download the file itself"),
-)
-
-
-def refuse_strangers(path: Path) -> None:
-    """Refuses a file that is something else than what its user took it for.
-
-    Raises:
-        InputError: It says what the file is and what helps.
-    """
-    if not path.is_file():
-        # What is read from a pipe is gone.
-        return
-    with contextlib.suppress(OSError), path.open("rb") as file:
-        begin = file.read(32)
-        for magic, what in _STRANGERS:
-            if begin.startswith(magic):
-                if magic == _ZIP:
-                    what = _ZIPPED.get(path.suffix.lower(), what)
-                raise InputError(f"{path} {what}.")
 
 
 def _explanation(path: Path, err: Exception) -> InputError:
