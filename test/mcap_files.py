@@ -44,6 +44,9 @@ class Channel:
     topic: str
     kind: str
     encoding: str = "cdr"
+    definition: str = ""
+    """Of the type."""
+    defined_in: str = "ros2msg"
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,13 @@ def write(
         profile: As its head says.
     """
     declared = b"".join(
-        _record(3, struct.pack("<H", number + 1) + _text(one.kind) + _text("ros2msg") + _text(""))
+        _record(
+            3,
+            struct.pack("<H", number + 1)
+            + _text(one.kind)
+            + _text(one.defined_in)
+            + _text(one.definition),
+        )
         + _record(
             4,
             struct.pack("<HH", number, number + 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 
 from rebt_ros.demonstration.demonstration import Demonstration
@@ -52,17 +53,20 @@ def _groups(labels: Iterable[str]) -> list[list[str]]:
 
 
 def _key(label: str) -> object:
-    """What labels have in common that are alike.
+    r"""What labels have in common that are alike.
 
     >>> _key("Move-Forward") == _key("move forward") == _key("moveForward")
     True
     >>> _key("1") == _key("1.0") != _key("-1")
     True
+    >>> _key("caf\u00e9") == _key("cafe\u0301")
+    True
     """
     try:
         return float(label)
     except ValueError:
-        return _PARTING.sub("", label.strip()).casefold()
+        # The same letter may be one character, or a plain one with an accent behind it.
+        return _PARTING.sub("", unicodedata.normalize("NFKC", label).strip()).casefold()
 
 
 def _listed(groups: Sequence[Sequence[str]]) -> str:

@@ -77,8 +77,20 @@ class LearningReport:
     sample: SampleReport | None = None
     """The sample that the structure of the tree was grown on; None for all rows."""
 
+    @property
+    def doubt(self) -> str:
+        """That a simpler policy would do better, without a full stop; empty where none would."""
+        if self.agreement is None or self.agreement >= self.most_frequent:
+            return ""
+        return (
+            f"the forecast, {self.agreement:.1%} agreement, is below the {self.most_frequent:.1%} "
+            "that always taking the most frequent action would reach: show more before it drives"
+        )
+
     def notes(self) -> Iterator[str]:
         """Warnings; no full stops."""
+        if self.doubt:
+            yield self.doubt
         if self.weighted:
             yield (
                 "demonstrations have weights: trees are grown, and recalls and agreement in "

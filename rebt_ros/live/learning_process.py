@@ -79,6 +79,8 @@ class Lesson:
     """How well it may do, for /diagnostics."""
     agreement: float | None = None
     """With the held-out rows, after its own choices; None where none were held out."""
+    doubts: Sequence[str] = ()
+    """Those of the notes that keep a node from saying that all is well."""
     rival: float | None = None
     """The same of the tree that is published, on the same rows; None where it cannot be told."""
 

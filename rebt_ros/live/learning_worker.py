@@ -228,6 +228,7 @@ def learn(
             for name, value in one.figures().items()
         },
         learned.provenance.figures.own_history_agreement,
+        tuple(f"{channel}{one.doubt}" for channel, one in led.items() if one.doubt),
         _agreement_of(request.published, learnings),
     )
     return Learned(lesson, result, request.demonstrations, options)

@@ -12,7 +12,7 @@ from rebt_ros.message_path.checking import CheckedPath, check
 from rebt_ros.message_path.compiling import wanted_of
 from rebt_ros.message_path.definition import Definitions, Primitive
 from rebt_ros.robot_file.errors import RobotFileError
-from rebt_ros.robot_file.labelling import Labeller, labeller
+from rebt_ros.robot_file.labelling import Labeller, check_values, labeller
 from rebt_ros.robot_file.robot_file import RobotFile, Stamp, StateFeature
 
 #: Type of the first field of messages that have a stamp.
@@ -117,8 +117,11 @@ def _feature(
     if kind is None:
         kind = FeatureKind.CATEGORICAL if categories else _kind_of(path)
     if kind is FeatureKind.CATEGORICAL:
+        numbers = {name: str(number) for number, name in path.names.items()}
+        check_values(path, categories)
+        categories = {numbers.get(value, value): name for value, name in categories.items()}
         if not categories:
-            categories = {str(number): name for number, name in path.names.items()}
+            categories = {number: name for name, number in numbers.items()}
         if path.kind is Primitive.NUMBER:
             raise RobotFileError(
                 f"{robot.name}: feature {feature.name!r} cannot be categorical: {feature.path} "

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 from rebt_ros.demonstration.builder import LARGEST_VALUE, StateTopic
 from rebt_ros.demonstration.categories import Categories
@@ -15,6 +15,9 @@ from rebt_ros.message_path.compiling import Getter, attribute_of, getter
 from rebt_ros.message_path.definition import Primitive
 from rebt_ros.robot_file.binding import BoundFeature, BoundTopic
 from rebt_ros.robot_file.robot_file import RobotFile
+
+#: So many values are remembered that are none of the categories.
+_MOST_UNNAMED: Final = 10
 
 #: Turns what a path gives into what a row holds, NaN for what is missing.
 _Encoder: TypeAlias = Callable[[float | str], float]
@@ -31,6 +34,8 @@ class FeatureReader:
     def __init__(self, topic: BoundTopic, categories: dict[str, Categories]) -> None:
         self.names = tuple(one.name for one in topic.features)
         """The names of the features, in the order of the values."""
+        self.unnamed: dict[str, dict[str, None]] = {}
+        """The first values that are none of the categories and so are missing, by feature."""
         plain: list[tuple[int, str]] = []
         self._others: list[tuple[int, Getter, _Encoder]] = []
         for place, feature in enumerate(topic.features):
@@ -38,7 +43,7 @@ class FeatureReader:
             if attribute and feature.kind is FeatureKind.NUMERIC:
                 plain.append((place, attribute))
             else:
-                encode = _encoder(feature, categories)
+                encode = _encoder(feature, categories, self.unnamed)
                 self._others.append((place, getter(feature.path), encode))
         self._places = [place for place, _ in plain]
         self._plain = attrgetter(*(attribute for _, attribute in plain)) if plain else None
@@ -81,7 +86,11 @@ def state_topics_of(robot: RobotFile) -> tuple[StateTopic, ...]:
     )
 
 
-def _encoder(feature: BoundFeature, categories: dict[str, Categories]) -> _Encoder:
+def _encoder(
+    feature: BoundFeature,
+    categories: dict[str, Categories],
+    unnamed: dict[str, dict[str, None]],
+) -> _Encoder:
     if feature.kind is FeatureKind.NUMERIC:
         return float
     if feature.kind is FeatureKind.BINARY:
@@ -93,7 +102,16 @@ def _encoder(feature: BoundFeature, categories: dict[str, Categories]) -> _Encod
     as_text = _text_of(feature)
     if not names:
         return lambda value: known.code(as_text(value))
-    return lambda value: known.code(names.get(as_text(value), ""))
+
+    def encoded(value: float | str) -> float:
+        text = as_text(value)
+        if text not in names and text:
+            others = unnamed.setdefault(feature.name, {})
+            if len(others) < _MOST_UNNAMED:
+                others[text] = None
+        return known.code(names.get(text, ""))
+
+    return encoded
 
 
 def _text_of(feature: BoundFeature) -> Callable[[float | str], str]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final, Protocol, TypeAlias
 
 from rebt_ros.errors import MessagePathError
-from rebt_ros.message_path.checking import check
+from rebt_ros.message_path.checking import CheckedPath, check
 from rebt_ros.message_path.compiling import Value, getter, wanted_of
 from rebt_ros.message_path.definition import Definitions, Primitive
 from rebt_ros.robot_file.robot_file import (
@@ -24,6 +25,8 @@ _JOY: Final = "sensor_msgs/msg/Joy"
 _TWIST: Final = "geometry_msgs/msg/Twist"
 _STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 _LOG: Final = "nav2_msgs/msg/BehaviorTreeLog"
+#: As integers are written, always in the same way.
+_INTEGER: Final = re.compile(r"0|-?[1-9]\d*", re.ASCII)
 
 
 #: Attributes that lead to a value, or to a message with all that is in it.
@@ -107,6 +110,7 @@ class PathLabeller:
                 f"message path {str(source.path)!r} gives a number with decimals, of which no "
                 "label can be made: choose a string, an integer or a bool."
             )
+        check_values(path, source.labels)
         self.wanted = wanted_of(path)
         self._get = getter(path)
         self._labels = source.labels
@@ -122,6 +126,25 @@ class PathLabeller:
         label = self._labels.get(text, self._labels.get(name, "")) if self._labels else name
         self.acts = bool(label)
         return self._changes.of(label)
+
+
+def check_values(path: CheckedPath, values: Iterable[str]) -> None:
+    """Refuses values, as they stand in a robot file, that a path never gives.
+
+    Raises:
+        MessagePathError: It says which there are.
+    """
+    if path.kind is Primitive.TRUTH:
+        wrong = [value for value in values if value not in ("true", "false")]
+        there = "true or false"
+    elif path.kind in (Primitive.INTEGER, Primitive.BYTE):
+        names = path.names.values()
+        wrong = [value for value in values if value not in names and not _INTEGER.fullmatch(value)]
+        there = " or ".join(["an integer", *([f"one of {', '.join(names)}"] if names else [])])
+    else:
+        return
+    if wrong:
+        raise MessagePathError(f"{str(path.path)!r} is never {wrong[0]!r}: it is {there}.")
 
 
 def _written(kind: Primitive, names: Mapping[int, str]) -> Callable[[Value], tuple[str, str]]:

@@ -42,6 +42,9 @@ _FEW: Final = 4
 _OLD: Final = 1_000_000_000
 _SILENT: Final = 10.0
 
+#: So far from each other (nanoseconds) are times by different clocks.
+_ANOTHER_CLOCK: Final = 86_400_000_000_000
+
 #: Topics of texts that describe a robot, which is no action.
 _DESCRIPTIONS: Final = frozenset({"robot_description", "robot_description_semantic"})
 
@@ -133,6 +136,8 @@ class Feed:
     """Stamp of another one."""
     bad: list[str] = field(default_factory=list)
     """What was wrong with the messages that were left out."""
+    firsts: dict[str, int] = field(default_factory=dict)
+    """Stamp of the first message by state topic."""
     last: dict[str, int] = field(default_factory=dict)
     """Stamp of the last message by state topic."""
     ages: dict[str, array[int]] = field(default_factory=dict)
@@ -207,6 +212,8 @@ class Feed:
                 self.compare(rows)
             if name in self.there:
                 self.last[name] = stamp
+                if self.seen[name] == 1:
+                    self.firsts[name] = stamp
             return rows
         except BadMessageError as err:
             if err.fault is Fault.NO_STATE:
@@ -290,6 +297,7 @@ class Feed:
                 f"left out: {_counted(self.stale, 'action')} after messages that are missing, "
                 "whose state is not known"
             )
+        notes += self._on_clocks()
         notes += self._on_silence()
         if self.bad:
             notes.append(
@@ -313,7 +321,20 @@ class Feed:
                 yield (
                     f"{_counted(len(old), 'row')} have a state that is up to {max(old) / 1e9:.3g} "
                     f"seconds old, as nothing usable came on {name!r} for so long, where messages "
-                    f"come every {usual / 1e9:.2g} seconds: see whether its sensor or driver failed"
+                    f"come every {usual / 1e9:.2g} seconds: see whether its sensor or driver "
+                    f"failed{', or another clock stamped it' if max(old) > _ANOTHER_CLOCK else ''}"
+                )
+
+    def _on_clocks(self) -> Iterator[str]:
+        """Notes on states that were recorded by another clock than the actions, or by none."""
+        for name in sorted(self.there):
+            begin, end = self.firsts.get(name, 0), self.last.get(name, 0)
+            if self._has_no_times() or self.seen[name] <= 1:
+                continue
+            if begin == end and self.seen[name] > _FEW:
+                yield (
+                    f"all messages on {name!r} were recorded at the same time ({begin} ns), and "
+                    "others were not, so that the last one is the state of all rows: record again"
                 )
 
     def _has_no_times(self) -> bool:
@@ -331,6 +352,12 @@ class Feed:
             if not self.seen[topic]:
                 return f"there is no message on {topic!r}; record it together with the others"
         if self.early:
+            ahead = min(self.firsts.values(), default=0) - self.earliest
+            if ahead > _ANOTHER_CLOCK:
+                return (
+                    f"all actions came before the first state, by up to {ahead / 86_400e9:.3g} "
+                    "days, as where they were recorded by another clock; record all by one clock"
+                )
             return "all actions came before the first state; start the state topics first"
         if self._has_no_times():
             return f"{self._no_times()}; leave out --sample-rate, or record with a clock"
@@ -372,15 +399,26 @@ def _decoded(data: bytes, kind: str) -> object:
     Raises:
         UndecodableError: It cannot be decoded.
     """
-    if data[:2] not in _PLAIN_CDR:
-        raise UndecodableError(
-            f" (it begins with {data[:2].hex()}, and plain CDR with 0000 or 0001)"
-        )
+    check_encapsulation(data)
     try:
         return _TYPES.deserialize_cdr(data, kind)
     except Exception as err:
         # The generated decoders let whatever goes wrong inside them through.
         raise UndecodableError from err
+
+
+def check_encapsulation(data: bytes) -> None:
+    """Refuses what is no message of plain CDR.
+
+    Raises:
+        UndecodableError: It says how the data begin.
+    """
+    if not data:
+        raise UndecodableError(" (it is empty)")
+    if data[:2] not in _PLAIN_CDR:
+        raise UndecodableError(
+            f" (it begins with {data[:2].hex()}, and plain CDR with 0000 or 0001)"
+        )
 
 
 def _array(data: bytes) -> ArrayMessage[FloatArray]:

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from textwrap import shorten
@@ -23,17 +24,24 @@ from rebt_ros.storage import bag_metadata, mcap, sqlite
 from rebt_ros.storage.bag_safety import check_bag
 from rebt_ros.storage.mcap import MAGIC as MCAP_MAGIC
 from rebt_ros.storage.mcap import McapFile, Survey
+from rebt_ros.storage.message_definitions import differ
 from rebt_ros.storage.packing import unpack_file, without_packing
+from rebt_ros.storage.strangers import refuse_strangers
 from rebt_ros.storage.text import unreadable
 from rebt_ros.storage.time_order import SET_BACK, by_time
 
 #: Suffixes of files that hold a bag's messages, in lower case.
 STORAGE_SUFFIXES: Final = (".mcap", ".db3")
 
+#: Suffixes of packed files that are to be unpacked before they are read.
+_PACKED_OTHERWISE: Final = (".gz", ".bz2", ".xz", ".zip", ".tar", ".7z")
+
 #: How the names of files begin in which macOS keeps what other file systems cannot hold.
 _APPLE: Final = "._"
 
 _CDR: Final = "cdr"
+#: What SQLite adds to the name of a database for that of its log.
+_LOG: Final = "-wal"
 _NUMBERED: Final = re.compile(r"(.+)_([0-9]{1,6})\.\w.*")
 #: A recording of a day that is split each minute has 1440 files.
 _MOST_FILES: Final = 10_000
@@ -44,6 +52,9 @@ Topic: TypeAlias = tuple[str, str]
 Message: TypeAlias = tuple[Topic, int, bytes]
 
 
+#: Reads the messages of some topics.
+_Reader: TypeAlias = Callable[[Collection[Topic]], Iterator[Message]]
+
 #: The topic of what stands for messages that are missing.
 GAP: Final[Topic] = ("", "")
 
@@ -53,6 +64,15 @@ def holds_messages(path: Path) -> bool:
     if path.name.startswith(_APPLE):
         return False
     return without_packing(path.name.lower()).endswith(STORAGE_SUFFIXES)
+
+
+def begins_like_messages(path: Path) -> bool:
+    """Whether a file begins as those of messages do, whatever it is called."""
+    if not path.is_file():
+        return False
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        return file.read(len(sqlite.MAGIC)).startswith((MCAP_MAGIC, sqlite.MAGIC))
+    return False
 
 
 def is_bag(directory: Path) -> bool:
@@ -72,13 +92,19 @@ class BagFiles:
     """Messages of those, by topic."""
     definitions: dict[str, str] = field(default_factory=dict)
     """Definitions of types as `.msg` files have them, by name."""
+    redefined: set[str] = field(default_factory=set)
+    """Names of types that have several of them, which differ."""
+    elsehow: dict[str, str] = field(default_factory=dict)
+    """How types are defined otherwise, by name."""
     stated: dict[Topic, int] = field(default_factory=dict)
     """How many the bag says that there are; only where it does."""
     notes: list[str] = field(default_factory=list)
     """What a person must know; no full stops."""
     is_incomplete: bool = False
     """Whether messages are missing inside of a file, or between two of them."""
-    _readers: list[Callable[[Collection[Topic]], Iterator[Message]]] = field(default_factory=list)
+    _readers: list[_Reader] = field(default_factory=list)
+    _files: dict[str, tuple[_Reader, Mapping[Topic, int]]] = field(default_factory=dict)
+    """What reads each file, and its messages by topic."""
 
     def messages(self, topics: Collection[Topic]) -> Iterator[Message]:
         """The messages by the time at which they were recorded; of one instant, as they stand.
@@ -105,18 +131,30 @@ class BagFiles:
                     is_gap = False
                 yield message
 
+    def define(self, kind: str, text: str) -> None:
+        """Adds the definition of a type."""
+        if differ(kind, self.definitions.setdefault(kind, text), text):
+            self.redefined.add(kind)
+
     def add(
-        self,
-        counts: Mapping[Topic, int],
-        stated: Mapping[Topic, int],
-        read: Callable[[Collection[Topic]], Iterator[Message]],
+        self, name: str, counts: Mapping[Topic, int], stated: Mapping[Topic, int], read: _Reader
     ) -> None:
-        """Adds a file."""
+        """Adds a file, unless it holds the same messages as another one."""
+        for other, (its, its_counts) in self._files.items():
+            if counts == its_counts and any(counts.values()) and _are_one(read, its, counts):
+                self.notes.append(f"{name} holds the same messages as {other}: they are read once")
+                return
+        self._files[name] = read, counts
         self.found.update(dict.fromkeys(counts, 0))
         self.found.update(counts)
         for topic, count in stated.items():
             self.stated[topic] = self.stated.get(topic, 0) + count
         self._readers.append(read)
+
+
+def _are_one(read: _Reader, other: _Reader, topics: Collection[Topic]) -> bool:
+    """Whether two files that have as many messages on each topic have the same ones."""
+    return all(one == its for one, its in zip_longest(read(topics), other(topics)))
 
 
 @contextmanager
@@ -183,6 +221,7 @@ def _files(
     plain = {one.name for one in there}
     twice = [one for one in there if without_packing(one.name) in plain - {one.name}]
     files = [one for one in there if one not in twice]
+    notes += _logs_alone(directory, plain)
     if metadata is None:
         if not files:
             raise InputError(
@@ -205,11 +244,25 @@ def _files(
     return sorted(files, key=lambda file: (listed.get(file.name, len(listed)), file.name))
 
 
+def _logs_alone(directory: Path, there: Collection[str]) -> Iterator[str]:
+    """Notes write-ahead logs of SQLite whose databases have another name, or are gone."""
+    for log in sorted(directory.glob(f"*{_LOG}")):
+        name = log.name.removesuffix(_LOG)
+        if name not in there and log.stat().st_size:
+            yield (
+                f"{log.name} may hold messages, and is read only beside {name}, which is "
+                "not there: give that file its name back"
+            )
+
+
 def _unfinished(directory: Path, missing: Sequence[str]) -> str:
     """What is there of missing files under longer names, as while they are copied or written."""
     there = sorted(one.name for one in directory.iterdir())
     found = [one for one in there if any(one.startswith(f"{name}.") for name in missing)]
-    return f", or wait for what writes {', '.join(found)}" if found else ""
+    if not found:
+        return ""
+    packed = all(one.lower().endswith(_PACKED_OTHERWISE) for one in found)
+    return f", or {'unpack' if packed else 'wait for what writes'} {', '.join(found)}"
 
 
 def _open_all(files: Sequence[Path], bag: BagFiles, stack: ExitStack) -> None:
@@ -272,7 +325,9 @@ def _open_mcap(path: Path, name: str, bag: BagFiles) -> None:
     with path.open("rb") as file:
         survey = McapFile(file).survey
     for kind, text in survey.definitions.items():
-        bag.definitions.setdefault(_full(kind), text)
+        bag.define(_full(kind), text)
+    bag.redefined.update(map(_full, survey.redefined))
+    bag.elsehow |= {_full(kind): how for kind, how in survey.elsehow.items()}
     number = {}
     for channel, about in survey.channels.items():
         if about.encoding == _CDR:
@@ -294,7 +349,7 @@ def _open_mcap(path: Path, name: str, bag: BagFiles) -> None:
     for channel, topic in number.items():
         counts[topic] += survey.found[channel]
         stated[topic] += survey.stated_of(channel)
-    bag.add(counts, stated, read)
+    bag.add(name, counts, stated, read)
     problems = tuple(_problems(survey))
     bag.is_incomplete |= bool(problems)
     bag.notes += (f"{name} {note}" for note in problems)
@@ -315,7 +370,12 @@ def _problems(survey: Survey) -> Iterator[str]:
             f"is damaged from byte {survey.gaps[0][0]} on: {lost} bytes are no records, and were "
             "not read"
         )
-    elif not survey.is_complete:
+    if survey.behind:
+        yield (
+            f"goes on for {survey.behind} bytes behind its end, which were not read, as where "
+            "files were put one behind the other: name each of them"
+        )
+    elif not survey.gaps and not survey.is_complete:
         yield "ends before its end, as where a recorder was killed: what is whole was read"
     if survey.damaged:
         yield f"is damaged: {_counted(survey.damaged, 'chunk is', 'chunks are')} left out"
@@ -337,7 +397,7 @@ def _counted(count: int, singular: str, plural: str) -> str:
 def _open_sqlite(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None:
     file = stack.enter_context(sqlite.opened(path))
     for kind, text in file.definitions():
-        bag.definitions.setdefault(_full(kind), text)
+        bag.define(_full(kind), text)
     topics: dict[int, Topic] = {}
     for one in file.topics:
         if one.encoding == _CDR:
@@ -360,7 +420,7 @@ def _open_sqlite(path: Path, name: str, bag: BagFiles, stack: ExitStack) -> None
     counts = Counter[Topic]()
     for number, topic in topics.items():
         counts[topic] += file.found[number]
-    bag.add(counts, {}, read)
+    bag.add(name, counts, {}, read)
     bag.is_incomplete |= bool(file.notes)
     bag.notes += (f"{name} {note}" for note in file.notes)
     _note_undeclared(file.undeclared, name, bag)
@@ -380,57 +440,6 @@ def explained(path: Path) -> Iterator[None]:
         raise
     except Exception as err:  # of struct, SQLite, zstd, YAML, ...: whatever the bytes provoke
         raise _explanation(path, err) from err
-
-
-_ZIP: Final = b"PK\x03\x04"
-
-#: What zip archives are, by their suffixes, and what helps.
-_ZIPPED: Final = {
-    **dict.fromkeys((".xlsx", ".xlsm", ".ods"), "is a spreadsheet: save the table as CSV"),
-    ".npz": "is an archive of NumPy arrays: write the table as CSV, with a line of column names",
-}
-
-#: How files begin that are no files of messages, what they are, and what helps.
-_STRANGERS: Final[Sequence[tuple[bytes, str]]] = (
-    (
-        b"version https://git-lfs",
-        "is a pointer of Git LFS, not the file itself: run `git lfs pull`",
-    ),
-    (
-        b"#ROSBAG V",
-        "is a bag of ROS 1: convert it with `rosbags-convert --src FILE --dst DIRECTORY`",
-    ),
-    (b"\x1f\x8b", "is packed with gzip: unpack it with `gunzip`"),
-    (_ZIP, "is a zip archive: unpack it with `unzip`"),
-    (b"PAR1", "is a Parquet file: write it as CSV, with pandas for example"),
-    (b"ARROW1", "is an Arrow file: write it as CSV, with pandas for example"),
-    (b"\x89HDF", "is an HDF5 file: write it as CSV, with pandas for example"),
-    (b"\x93NUMPY", "is an array of NumPy: write it as CSV, with a line of column names"),
-    (b"\xd0\xcf\x11\xe0", "is a file of an old Excel or Word: save the table as CSV"),
-    (b"%PDF", "is a PDF file: name the file that it was made of"),
-    (b"\xfd7zXZ", "is packed with xz: unpack it with `unxz`"),
-    (b"BZh", "is packed with bzip2: unpack it with `bunzip2`"),
-    (b"<!DOCTYPE", "is a page of HTML, as a failed download leaves it: download the file itself"),
-    (b"<html", "is a page of HTML, as a failed download leaves it: download the file itself"),
-)
-
-
-def refuse_strangers(path: Path) -> None:
-    """Refuses a file that is something else than what its user took it for.
-
-    Raises:
-        InputError: It says what the file is and what helps.
-    """
-    if not path.is_file():
-        # What is read from a pipe is gone.
-        return
-    with contextlib.suppress(OSError), path.open("rb") as file:
-        begin = file.read(32)
-        for magic, what in _STRANGERS:
-            if begin.startswith(magic):
-                if magic == _ZIP:
-                    what = _ZIPPED.get(path.suffix.lower(), what)
-                raise InputError(f"{path} {what}.")
 
 
 def _explanation(path: Path, err: Exception) -> InputError:

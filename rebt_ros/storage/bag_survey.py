@@ -31,7 +31,7 @@ def survey_bag(path: Path) -> tuple[tuple[TopicSurvey, ...], tuple[str, ...]]:
     with opened_bag(path) as bag:
         if not kinds_of(bag):
             raise InputError(f"{path} holds no messages: record the robot's topics first.")
-        types = BagTypes(bag.definitions)
+        types = BagTypes(bag.definitions, bag.elsehow)
         surveys: dict[Topic, TopicSurvey] = {}
         notes = list(bag.notes)
         for topic, count in sorted(bag.found.items()):

@@ -76,6 +76,8 @@ _DECIMAL_COMMA = re.compile(r"[+-]?(?:\d{1,3}(?:\.\d{3})+|\d*),\d+(?:[eE][+-]?\d
 _UNIT = re.compile(
     r"(?P<number>[^A-Za-z°µμΩ%]*\d[eE][+-]?\d+|[^A-Za-z°µμΩ%]*\d\.?) ?(?P<unit>\D.*)"
 )
+#: A number as addresses, flags and bytes are written.
+_HEXADECIMAL = re.compile(r"0[xX][0-9a-fA-F]{1,16}")
 #: What has digits, and no letters before them.
 _AMOUNT = re.compile(r"[^A-Za-z\d]*\d.*")
 _MONTH = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*\.?"
@@ -94,6 +96,8 @@ _MOSTLY, _FEW_WORDS, _MANY_NUMBERS = 0.9, 3, 20
 _FEW_TEXTS, _RECURRING = 20, 0.5
 #: Nor more texts than that: each is an indicator of as many cells as there are rows.
 _MOST_TEXTS = 1000
+#: Nor longer ones, which nobody could read in a tree (characters).
+_LONGEST_TEXT = 1000
 _LONGEST_UNIT = 12
 #: A number stands in for none where it is so often there, beside so many others, and so many times
 #: as far from the next as they are from each other and from zero.
@@ -319,6 +323,9 @@ def _in_notation(
     name: str, cells: Sequence[str], distinct: Iterable[str], *, decimal_commas: bool = False
 ) -> Column | None:
     """Numbers as people write them, all in the same way."""
+    if any(distinct) and all(_HEXADECIMAL.fullmatch(cell) for cell in distinct if cell):
+        note = f"column {name!r} is read as numbers, which are hexadecimal"
+        return _numeric(name, np.array([int(cell, 16) if cell else np.nan for cell in cells]), note)
     said: list[str] = []
     if any(_MINUS in cell for cell in distinct):
         distinct = {cell.replace(_MINUS, "-") for cell in distinct}
@@ -407,6 +414,10 @@ def _texts(
         return NoFeature(
             f"column {name!r} holds {len(distinct)} different texts in {filled} cells, such as "
             f"{cells[next(i for i, cell in enumerate(cells) if cell)]!r}, and is no feature"
+        )
+    if (longest := max(map(len, distinct), default=0)) > _LONGEST_TEXT:
+        return NoFeature(
+            f"column {name!r} holds texts of up to {longest} characters, and is no feature"
         )
     categories = sorted(distinct)
     values = codes(("", *categories), cells).astype(np.float64) - 1

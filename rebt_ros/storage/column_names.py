@@ -39,6 +39,13 @@ _LINE_BREAKS = re.compile(r"\s*[\r\n]\s*")
 
 #: The column of one of these names holds the actions, wherever it stands.
 _ACTIONS = frozenset({"action", "actions"})
+#: And that of one of these may do.
+_MAYBE_ACTIONS = frozenset(
+    {
+        *("label", "labels", "class", "command", "cmd", "behavior", "behaviour"),
+        *("decision", "skill", "choice", "target"),
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +140,11 @@ def of_the_actions(names: Sequence[str]) -> int | None:
     """The position of the only column that is called after the actions; None if there is none."""
     found = [place for place, name in enumerate(names) if name.lower() in _ACTIONS]
     return found[0] if len(found) == 1 else None
+
+
+def names_actions(name: str, last: str) -> bool:
+    """Whether a column's name says rather than that of the last one that it holds the actions."""
+    return name.lower() in _MAYBE_ACTIONS and last.lower() not in _MAYBE_ACTIONS
 
 
 def label_position(columns: Sequence[str], label: str, *, said: bool) -> int | None:

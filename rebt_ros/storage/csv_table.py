@@ -40,6 +40,7 @@ from rebt_ros.storage.column_names import (
     column_names,
     counts_rows,
     label_position,
+    names_actions,
     of_the_actions,
 )
 from rebt_ros.storage.episode_columns import (
@@ -49,8 +50,9 @@ from rebt_ros.storage.episode_columns import (
     named_episodes,
 )
 from rebt_ros.storage.filling import filled_down
+from rebt_ros.storage.no_rows import NoRow
 from rebt_ros.storage.read import Part, Read
-from rebt_ros.storage.records import NoRow, Records, read_records
+from rebt_ros.storage.records import Records, read_records
 from rebt_ros.storage.stamp_column import falls, stamps_of
 from rebt_ros.storage.table_doubts import actions_again, of_actions, of_choices, of_features
 
@@ -505,6 +507,14 @@ def _default_label(columns: Sequence[str], rows: Sequence[Sequence[str]], notes:
     elif all(is_missing(cell) or is_truth(cell) for cell in held):
         what = "truths"
     else:
+        called = next(
+            (place for place in range(last) if names_actions(columns[place], columns[last])), None
+        )
+        if called is not None and _holds_words(rows, called):
+            notes.append(
+                f"column {columns[last]!r} is taken for the actions because it is the last, and "
+                f"{columns[called]!r} is a feature: name the label column if it is that one"
+            )
         return last
     words = next((place for place in range(last) if _holds_words(rows, place)), None)
     if words is not None:

@@ -96,9 +96,8 @@ def _last_comment(comments: str, delimiter: str) -> tuple[str, ...]:
 def _delimiter(text: str) -> str:
     """The one that gives all records as many cells as the first.
 
-    Where none does, the names may lack that of the first column; then titles above the table, which
-    have a single cell, do not count; then most records do; and then it is commas.
-
+    Where none does, the names may lack that of the first column; then most records do; then titles
+    above the table, which have a single cell, do not count; and then it is commas.
 
     A table with semicolons may have a decimal comma in each cell, so that commas would do as well:
     then there are semicolons in the cells of its first record.
@@ -108,7 +107,7 @@ def _delimiter(text: str) -> str:
         one_less = [one for one in _DELIMITERS if _lacks_a_name(_counts(text, one))]
         below_titles = [one for one in _DELIMITERS if _fits(text, one, titles=True)]
         mostly = [one for one in _DELIMITERS if one != " " and _fits_most(text, one)]
-        return next(iter([*one_less, *below_titles, *mostly, ","]))
+        return next(iter([*one_less, *mostly, *below_titles, ","]))
     if fitting[0] == ",":
         first = next(_first_records(text, ","))
         others = [one for one in fitting[1:] if one != " " and any(one in cell for cell in first)]
@@ -120,7 +119,8 @@ def _fits(text: str, delimiter: str, *, titles: bool = False) -> bool:
     counts = _counts(text, delimiter)
     if titles:
         counts = list(dropwhile(lambda count: count == 1, counts))
-    return len(set(counts)) == 1 and min(counts) > 1
+    fewest = 2 if titles else 1
+    return len(counts) >= fewest and len(set(counts)) == 1 and counts[0] > 1
 
 
 def _lacks_a_name(counts: Sequence[int]) -> bool:

@@ -17,6 +17,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import BinaryIO, Final, NamedTuple
 
+from rebt_ros.storage.message_definitions import differ
 from rebt_ros.storage.packing import unlz4, unzstd
 from rebt_ros.storage.time_order import by_time
 
@@ -82,6 +83,10 @@ class Survey:
     channels: dict[int, McapChannel] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
     """Definitions of types as `.msg` files have them, by name."""
+    redefined: set[str] = field(default_factory=set)
+    """Names of types that have several of them, which differ."""
+    elsehow: dict[str, str] = field(default_factory=dict)
+    """How types are defined otherwise, by name."""
     found: Counter[int] = field(default_factory=Counter)
     """Messages by channel."""
     stated: dict[int, int] | None = None
@@ -100,6 +105,8 @@ class Survey:
     """Numbers of the parts that end inside of a record."""
     is_complete: bool = False
     """Whether the file has its end."""
+    behind: int = 0
+    """Bytes behind that, unless the first of them are zero."""
     in_order: bool = True
     """Whether chunks follow each other in time."""
     set_back: bool = False
@@ -258,6 +265,9 @@ class McapFile:
                 yield None
             elif kind == _FOOTER:
                 survey.is_complete = True
+                end = start + length + len(MAGIC)
+                if any(self._content(end, len(MAGIC))):
+                    survey.behind = self._file.seek(0, os.SEEK_END) - end
         if loose:
             yield bytes(loose)
 
@@ -270,8 +280,13 @@ class McapFile:
             (number,) = struct.unpack_from("<H", content)
             self._schemas[number], place = _text(content, 2)
             encoding, place = _text(content, place)
+            name = self._schemas[number]
             if encoding == _MSG:
-                self.survey.definitions[self._schemas[number]], _ = _text(content, place)
+                text, _ = _text(content, place)
+                if differ(name, self.survey.definitions.setdefault(name, text), text):
+                    self.survey.redefined.add(name)
+            elif encoding:
+                self.survey.elsehow[name] = encoding
 
     def _note_channel(self, content: memoryview) -> None:
         with contextlib.suppress(struct.error, UnicodeDecodeError):

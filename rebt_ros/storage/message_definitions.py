@@ -13,8 +13,10 @@ from typing import Any, Final, TypeAlias
 
 from rosbags.interfaces import Nodetype
 
-#: Constants and fields of each type, in the form of rosbags.
-Definitions: TypeAlias = dict[str, tuple[list[tuple[str, str, Any]], list[tuple[str, Any]]]]
+#: Constants and fields of a type, in the form of rosbags.
+Definition: TypeAlias = tuple[list[tuple[str, str, Any]], list[tuple[str, Any]]]
+#: Those of each type.
+Definitions: TypeAlias = dict[str, Definition]
 
 #: Longest text that is read, in characters, and most types in it.
 LARGEST: Final = 500_000
@@ -50,8 +52,19 @@ def parse_definitions(name: str, text: str) -> Definitions:
     return found
 
 
+def differ(name: str, one: str, other: str) -> bool:
+    """Whether definitions of a type say something else, and not only in other words."""
+    return one != other and parse_definitions(name, one) != parse_definitions(name, other)
+
+
 def is_known(name: str, definitions: Mapping[str, Any]) -> bool:
     """Whether a type and all types within it are known."""
+    within = types_within(name, definitions)
+    return all(one in definitions for one in within) and not _holds_itself(name, definitions, ())
+
+
+def types_within(name: str, definitions: Mapping[str, Any]) -> set[str]:
+    """A type and all types within it, as far as they are known."""
     seen: set[str] = set()
     waiting = [name]
     while waiting:
@@ -59,14 +72,12 @@ def is_known(name: str, definitions: Mapping[str, Any]) -> bool:
         if one in seen:
             continue
         seen.add(one)
-        if one not in definitions:
-            return False
-        for _, (node, about) in definitions[one][1]:
+        for _, (node, about) in definitions[one][1] if one in definitions else ():
             if node in (Nodetype.ARRAY, Nodetype.SEQUENCE):
                 node, about = about[0]
             if node == Nodetype.NAME:
                 waiting.append(about)
-    return not _holds_itself(name, definitions, ())
+    return seen
 
 
 def _holds_itself(name: str, definitions: Mapping[str, Any], above: tuple[str, ...]) -> bool:

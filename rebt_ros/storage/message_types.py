@@ -12,7 +12,13 @@ from rosbags.typesys.base import normalize_fieldname
 
 from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.definition import FILLER, Field, MessageType, Primitive
-from rebt_ros.storage.message_definitions import Definitions, is_known, parse_definitions
+from rebt_ros.storage.message_definitions import (
+    Definition,
+    Definitions,
+    is_known,
+    parse_definitions,
+    types_within,
+)
 from rebt_ros.storage.partial_messages import Attributes, PartialDecoder
 
 #: Bytes before the values of a message, and what tells their order.
@@ -38,12 +44,19 @@ class BagTypes:
 
     Args:
         definitions: Definitions in the bag by the name of their type, as `.msg` files have them,
-            those of the types within them included.  They are looked at when they are needed, and
-            only where ROS 2 has no type of that name.
+            those of the types within them included.  They are looked at when they are needed.
+            Where ROS 2 has another type of that name, as in another distribution, the messages of
+            the bag are those of the bag's.
+        elsehow: How the bag defines types where it does so otherwise, by their names.
     """
 
-    def __init__(self, definitions: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        definitions: Mapping[str, str] | None = None,
+        elsehow: Mapping[str, str] | None = None,
+    ) -> None:
         self._texts = definitions or {}
+        self._elsehow = elsehow or {}
         self._store = get_typestore(Stores.ROS2_JAZZY)
         self._own: Definitions = {}
         self._fields = ChainMap[str, Any](self._own, dict(self._store.fielddefs))
@@ -66,7 +79,7 @@ class BagTypes:
         Raises:
             Exception: The data are no such message; rosbags raises whatever it meets.
         """
-        if name in self._own:
+        if not self._own.keys().isdisjoint(types_within(name, self._fields)):
             if name not in self._decoders:
                 self._decoders[name] = PartialDecoder(name, [()], self._fields).decode
             return self._decoders[name](data)
@@ -93,21 +106,47 @@ class BagTypes:
             return lambda data: self.decode(data, name)
 
     def _definition(self, name: str) -> MessageType:
-        if name not in self._fields and name in self._texts:
-            for kind, its in parse_definitions(name, self._texts[name]).items():
-                if kind not in self._store.fielddefs:
+        if self._texts.get(name, "").strip():
+            found = parse_definitions(name, self._texts[name])
+            # What cannot be read of a definition is no other one.
+            whole = is_known(name, ChainMap(found, self._fields))
+            for kind, its in found.items():
+                ours = self._store.fielddefs.get(kind)
+                if ours is None or (whole and its[1] and not _are_one(its, ours)):
                     self._own.setdefault(kind, its)
         if not is_known(name, self._fields):
             self._own.pop(name, None)
-            raise MessagePathError(
-                f"the type {name} is none of ROS 2 Jazzy, and the bag does not define it."
+            how = self._elsehow.get(name)
+            why = (
+                f"the bag defines it in {how}, which is not read here: record it with a package "
+                "that has .msg files"
+                if how
+                else "the bag does not define it: record it where its package is sourced"
             )
+            raise MessagePathError(f"the type {name} is none of ROS 2 Jazzy, and {why}.")
         constants, fields = self._fields[name]
         return MessageType(
             name,
             tuple(_field(field, its) for field, its in fields if field != FILLER),
             _whole(constants),
         )
+
+
+def _are_one(one: Definition, other: Any) -> bool:
+    """Whether definitions have the same fields and whole constants, whatever their bounds."""
+    return _shapes(one[1]) == _shapes(other[1]) and _whole(one[0]) == _whole(other[0])
+
+
+def _shapes(fields: Iterable[tuple[str, Any]]) -> list[tuple[str, Any]]:
+    """Fields without the bounds of texts and sequences."""
+
+    def shape(descriptor: Any) -> Any:
+        node, about = descriptor
+        if node in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+            return node, shape(about[0]), about[1] if node == Nodetype.ARRAY else 0
+        return node, about if node == Nodetype.NAME else about[0]
+
+    return [(name, shape(its)) for name, its in fields if name != FILLER]
 
 
 def _whole(constants: Iterable[tuple[str, str, Any]]) -> dict[str, int]:

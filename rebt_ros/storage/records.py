@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 import csv
-import re
 from array import array
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 
 from rebt_ros.errors import InputError
-from rebt_ros.storage.cells import is_failed, is_missing, is_number
-from rebt_ros.storage.dialect import COMMENT, Dialect, dialect_of
+from rebt_ros.storage.cells import is_number
+from rebt_ros.storage.dialect import Dialect, dialect_of
+from rebt_ros.storage.no_rows import NoRow, below_groups, no_rows
 from rebt_ros.storage.text import read_text, windows_text
-
-
-class NoRow(Enum):
-    """Why a record is no row."""
-
-    EMPTY = "is empty", "are empty"
-    COMMENT = "is a comment", "are comments"
-    NAMES = "repeats the column names", "repeat the column names"
-    TITLE = "is a title", "are titles"
-    UNITS = "says units below the column names", "say units below the column names"
-    RULER = "is a ruled line", "are ruled lines"
-
-    def __init__(self, single: str, several: str) -> None:
-        self.single = single
-        self.several = several
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +63,8 @@ _BYTE_ORDER_MARK = "\ufeff"
 #: How JSON begins that holds objects.
 _JSON = ("{", "[{")
 
-#: A cell of a line that is drawn, as below the names of a table in Markdown.
-_RULED = re.compile(r"(?::?-+:?|=+|[-+]+)?")
-_BRACKETED = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
+#: Longest cell (characters): that of a scan or an image as text has some millions.
+_LONGEST_CELL = 1 << 30
 
 
 def read_records(path: Path) -> Records:
@@ -105,13 +89,23 @@ def read_records(path: Path) -> Records:
         )
     if text.lstrip().startswith(_JSON):
         raise InputError(f"{path} is JSON, and no table: name a CSV table, a bag or a recording.")
-    dialect = dialect_of(text)
-    rows, lines = _parsed(path, text, dialect)
+    with _long_cells():
+        dialect = dialect_of(text)
+        rows, lines = _parsed(path, text, dialect)
     filled = [place for place, cells in enumerate(rows) if any(map(str.strip, cells))]
     if not filled:
         raise InputError(f"{path} is empty: name a table with rows.")
-    reasons = _no_rows([rows[place] for place in filled])
+    reasons = no_rows(
+        [rows[place] for place in filled],
+        {
+            number
+            for number, place in enumerate(filled)
+            if place and place - 1 != filled[number - 1]
+        },
+    )
     kept = [place for place, reason in zip(filled, reasons, strict=True) if reason is None]
+    if named := below_groups([rows[place] for place in filled], reasons):
+        rows[kept[0]] = named
     left_out = Counter(reason for reason in reasons if reason is not None)
     left_out[NoRow.EMPTY] += sum(map(bool, rows)) - len(filled)
     rows = [rows[place] for place in kept]
@@ -141,66 +135,25 @@ def read_records(path: Path) -> Records:
     )
 
 
-def _no_rows(records: Sequence[Sequence[str]]) -> list[NoRow | None]:
-    """Why each of the records that hold something is no row; None where it may be one."""
-    titles = _titles(records)
-    width = len(records[titles])
-    numbered = _numbered(records[titles + 1 :])
-    reasons: list[NoRow | None] = [NoRow.TITLE] * titles
-    for place, cells in enumerate(records[titles:]):
-        reason = None
-        if _is_comment(cells[0]) and place and (len(cells) != width or numbered):
-            reason = NoRow.COMMENT
-        elif place and all(_RULED.fullmatch(cell.strip()) for cell in cells):
-            reason = NoRow.RULER
-        elif place == 1 and _says_units(cells):
-            reason = NoRow.UNITS
-        reasons.append(reason)
-    return reasons
-
-
-def _titles(records: Sequence[Sequence[str]]) -> int:
-    """How many records above a table have nothing but their first cell, as titles do."""
-    count = 0
-    while count < len(records) - 2 and not any(map(str.strip, records[count][1:])):
-        count += 1
-    # Below them are names: several, each column with one, over rows of as many cells.
-    names = records[count]
-    below = records[min(count + 1, len(records) - 1)]
-    are_names = len(names) > 1 and all(map(str.strip, names)) and len(below) == len(names)
-    return count if are_names else 0
-
-
-def _numbered(records: Sequence[Sequence[str]]) -> bool:
-    """Whether the first column holds numbers, so that what begins like a comment is one."""
-    cells = {cells[0].strip() for cells in records if not _is_comment(cells[0])}
-    filled = [cell for cell in cells if not is_missing(cell)]
-    return bool(filled) and all(map(is_number, filled))
-
-
-def _is_comment(cell: str) -> bool:
-    """Whether a record whose first cell this is may be a comment."""
-    return cell.startswith(COMMENT) and not (is_failed(cell.strip()) or is_missing(cell.strip()))
-
-
-def _says_units(cells: Sequence[str]) -> bool:
-    """Whether a record below names has brackets around whatever it holds, as around units."""
-    filled = [cell.strip() for cell in cells if not is_missing(cell.strip())]
-    return bool(filled) and all(
-        _BRACKETED.fullmatch(cell) and not is_number(cell[1:-1]) for cell in filled
-    )
-
-
 def _without_blank_ends(rows: Sequence[list[str]]) -> list[list[str]]:
     """Rows without the blank cells that some programs put behind the last one."""
     width = len(rows[0])
-    if all(len(cells) == width for cells in rows):
-        while width > 1 and not any(cells[width - 1].strip() for cells in rows):
-            width -= 1
+    while width > 1 and all(len(cells) < width or not cells[width - 1].strip() for cells in rows):
+        width -= 1
     return [
         cells[:width] if len(cells) > width and not any(map(str.strip, cells[width:])) else cells
         for cells in rows
     ]
+
+
+@contextmanager
+def _long_cells() -> Iterator[None]:
+    """Has the csv module read cells of any length, as long as it lasts."""
+    before = csv.field_size_limit(_LONGEST_CELL)
+    try:
+        yield
+    finally:
+        csv.field_size_limit(before)
 
 
 def _lacks_a_name(rows: Sequence[Sequence[str]]) -> bool:

@@ -12,7 +12,7 @@ from typing import Final, TypeAlias
 from rebt_ros.demonstration.builder import BadMessageError, DemonstrationBuilder
 from rebt_ros.demonstration.categories import Categories
 from rebt_ros.demonstration.demonstration import Row
-from rebt_ros.errors import InputError
+from rebt_ros.errors import InputError, listing
 from rebt_ros.robot_file.binding import BoundTopic, bind
 from rebt_ros.robot_file.features import FeatureReader, described, state_topics_of
 from rebt_ros.robot_file.labelling import Labeller
@@ -22,6 +22,7 @@ from rebt_ros.storage.bag import (
     Feed,
     LateError,
     UndecodableError,
+    check_encapsulation,
     kinds_of,
     listed,
     messages_of,
@@ -67,7 +68,7 @@ def read_robot_bag(
     if not robot.actions:
         raise InputError(f"{robot.name} has no part 'actions', so that a bag shows no actions.")
     with opened_bag(path) as bag:
-        types = BagTypes(bag.definitions)
+        types = BagTypes(bag.definitions, bag.elsehow)
         with with_notes(bag):
             kinds = kinds_of(bag)
             if not kinds:
@@ -76,6 +77,12 @@ def read_robot_bag(
                 topic: bind(robot, name, topic[1], types)
                 for topic, name in _chosen(path, kinds, robot).items()
             }
+        if changed := sorted(bag.redefined & {kind for _, kind in wanted}):
+            raise InputError(
+                f"{path} defines {changed[0]} in several ways, as where its package changed "
+                "between two recordings, so that messages would be misread: name the files of "
+                "the bag one by one, or record again."
+            )
         states = [value for value in wanted.values() if value.features]
         categories: dict[str, Categories] = {}
         readers = {state.name: FeatureReader(state, categories) for state in states}
@@ -140,9 +147,18 @@ class _RobotFeed(Feed):
                 "headers (0): leave out 'stamp: header' there, or have their publisher fill it in"
                 for topic, count in sorted(self.unstamped.items())
             ),
+            *self._on_categories(),
             *self.lacking,
             *super(_RobotFeed, self).notes(),
         )
+
+    def _on_categories(self) -> Iterator[str]:
+        for reader in self.readers.values():
+            for feature, values in reader.unnamed.items():
+                yield (
+                    f"feature {feature!r} has no value where its field is {listing([*values])}, "
+                    "which is none of its categories"
+                )
 
     def why_no_rows(self, topics: Sequence[str]) -> str:
         """Why there are no rows, and what helps; see `Feed.why_no_rows`."""
@@ -164,7 +180,11 @@ class _RobotFeed(Feed):
         try:
             message = decode(data)
         except Exception as err:  # whatever the generated decoders meet
-            raise UndecodableError from err
+            check_encapsulation(data)
+            why = ""
+            if isinstance(err, NotImplementedError):
+                why = " (it has wide strings, or arrays of strings, which are not read here)"
+            raise UndecodableError(why) from err
         rows: list[Row] = []
         refused: BadMessageError | None = None
         # What is done follows from what was there before this message.

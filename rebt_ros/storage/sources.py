@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Final
 
 from rebt_ros.errors import InputError, listing, printable
-from rebt_ros.storage.bag_files import holds_messages, is_bag, refuse_strangers
+from rebt_ros.storage.bag_files import begins_like_messages, holds_messages, is_bag
 from rebt_ros.storage.bag_metadata import NAME as METADATA
 from rebt_ros.storage.input_options import InputKind, Source
 from rebt_ros.storage.recording_files import is_named_so, is_recording, no_recordings, recordings
+from rebt_ros.storage.strangers import PACKED_ARCHIVES, refuse_strangers
 from rebt_ros.storage.text import unreadable
 
 #: Suffixes of tables, in lower case.
@@ -26,7 +27,8 @@ _TABLES = frozenset({".csv", ".tsv"})
 #: Ends of names of what may be demonstrations and is not read, in lower case.
 _UNREAD = (
     *(f"{suffix}{packed}" for suffix in (".csv", ".tsv") for packed in (".gz", ".bz2", ".xz")),
-    *(".bag", ".xlsx", ".xls", ".ods", ".parquet", ".feather", ".zip"),
+    *(".bag", ".xlsx", ".xls", ".ods", ".parquet", ".feather", ".zip", ".tar", ".7z", ".rar"),
+    *PACKED_ARCHIVES,
 )
 
 #: How an input begins that is a list of inputs.
@@ -244,8 +246,9 @@ def _within(directory: Path) -> Iterator[Source]:
 
 
 def _kind_of(file: Path) -> InputKind:
-    refuse_strangers(file)
-    if holds_messages(file):
+    if not holds_messages(file):
+        refuse_strangers(file)
+    if holds_messages(file) or begins_like_messages(file):
         return InputKind.BAG
     if has_table_suffix(file) or not is_recording(file):
         return InputKind.TABLE

@@ -31,6 +31,8 @@ _SIGNS = re.compile(r"[°µ²³±€£§·«»¼½¾×÷¿¡ª\u00a0\u2013\u2014
 
 #: Files that are no text have a zero byte among so many, as a rule.
 _BINARY = 1024
+#: What DOS puts behind a text.
+_END_OF_FILE = "\x1a"
 
 
 def read_text(path: Path, otherwise: Callable[[bytes], str | None] = lambda _: None) -> str:
@@ -51,9 +53,14 @@ def read_text(path: Path, otherwise: Callable[[bytes], str | None] = lambda _: N
         raise unreadable(path, err) from err
     except ValueError as err:
         raise InputError(f"{str(path)!r} is no name of a file: check it.") from err
+    encoding = _encoding(data)
     try:
-        text = data.decode(_encoding(data))
+        text = data.decode(encoding)
     except UnicodeDecodeError as err:
+        if encoding.startswith(("utf-16", "utf-32")) and err.end == len(data):
+            raise InputError(
+                f"{path} ends inside of a character, as where its copy was cut off: copy it again."
+            ) from err
         if b"\0" in data[:_BINARY]:
             raise _no_text(path) from err
         other = otherwise(data)
@@ -62,8 +69,9 @@ def read_text(path: Path, otherwise: Callable[[bytes], str | None] = lambda _: N
         line = data.count(b"\n", 0, err.start) + 1
         raise InputError(f"{path}, line {line}: this is not UTF-8 text: save it as UTF-8.") from err
     if "\0" not in text:
-        return text
-    if "\0" in text.rstrip("\0"):
+        return text.removesuffix(_END_OF_FILE)
+    filled = text.rstrip("\0")
+    if "\0" in filled or "\n" not in filled:
         raise _no_text(path)
     raise InputError(
         f"{path} ends in zero bytes, as where a machine lost power while it was written: "

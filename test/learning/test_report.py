@@ -70,6 +70,15 @@ def test_the_figures_are_those_of_the_level_that_was_chosen() -> None:
         assert report.agreement == 0.5
 
 
+@pytest.mark.parametrize(("agreement", "noted"), [(0.6, True), (0.7, False), (None, False)])
+def test_a_forecast_below_what_the_most_frequent_action_would_reach_is_noted(
+    agreement: float | None, *, noted: bool
+) -> None:
+    report = LearningReport((), agreement, agreement, 0.7, 0, 0, 10)
+    found = [note for note in report.notes() if "always taking the most frequent action" in note]
+    assert found == [report.doubt] * noted
+
+
 def test_an_action_that_the_tree_never_takes_is_named() -> None:
     shown = rows_of([float(n) for n in range(5)], [0, 0, 0, 2, 3])
     shown.chosen[4] = 2

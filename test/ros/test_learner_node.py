@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import random
 import resource
 import signal
 from dataclasses import replace
@@ -561,6 +562,46 @@ def test_a_tree_that_agrees_too_little_is_held_back_with_the_reason(
         answer = peer.call("/learner/relearn")
         assert answer.success, answer.message
         assert "keep_if_better had no say" in answer.message
+
+
+def _warning(peer: Peer, what: str) -> None:
+    peer.wait_until(
+        lambda: (
+            (one := peer.diagnostics.get("learner: learning"))
+            and one.level == DiagnosticStatus.WARN
+            and what in one.message
+        ),
+        what=f"a warning of {what!r}",
+    )
+
+
+def test_a_tree_that_is_worse_or_of_far_fewer_rows_is_published_with_a_warning(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations", 200)
+    noise = random.Random(1)
+    with RecordingWriter(tmp_path / "noise", FEATURES, ["action"]) as writer:
+        for step in range(60):
+            action = "turn" if noise.random() < 0.4 else "go"
+            writer.write(Row(step, "action", action, None, (noise.random(), noise.random())))
+    with NodeProcess("learner_node", domain, tmp_path, {}) as learner:
+        heard = peer.listen(String, "behavior_tree", LATCHED)
+        assert peer.call("/learner/relearn").success
+        _latest(peer, heard, 1)
+        _set(peer, demonstrations=str(tmp_path / "noise"))
+        answer = peer.call("/learner/relearn")
+        assert answer.success, answer.message
+        _latest(peer, heard, 2)
+        fewer = "it was learned from 60 rows, and the tree before it from 200"
+        assert fewer in answer.message
+        learner.says(fewer)
+        _warning(peer, fewer)
+        # Learned again from the same, it is none of fewer rows, but still of no use.
+        answer = peer.call("/learner/relearn")
+        assert "learned from 60 rows, and the tree" not in answer.message
+        doubt = "that always taking the most frequent action would reach"
+        assert doubt in answer.message
+        _warning(peer, doubt)
 
 
 def test_a_relearn_writes_what_learn_writes_and_a_robot_in_a_namespace_has_its_own_directories(

@@ -132,6 +132,17 @@ def test_a_recorder_says_once_that_nobody_publishes_and_what_was_not_recorded(
     assert recorder.stderr.count("nobody publishes on /action.") == 1
 
 
+def test_a_recorder_that_is_stopped_without_rows_warns_in_its_own_name(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT) as recorder:
+        peer.state(0.0)
+    said = next(line for line in recorder.stderr.splitlines() if "no rows were recorded" in line)
+    assert said.startswith("[WARN]")
+    assert "[recorder.stop]" in said
+    assert "Failed to publish" not in recorder.stderr
+
+
 def test_a_recorder_is_ready_once_it_has_heard_every_topic(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:

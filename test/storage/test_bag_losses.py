@@ -18,6 +18,7 @@ from unittest import mock
 import lz4.frame
 import mcap_files as mcap
 import pytest
+import test_bag_table as table
 from benchmarks.large_inputs import many_topics
 from fuzz import corpus
 from hypothesis import given, settings
@@ -132,11 +133,53 @@ def test_a_number_in_place_of_a_message_is_an_unusable_message(tmp_path: Path) -
 
 
 def test_a_file_beside_those_that_are_listed_is_read_with_a_note(tmp_path: Path) -> None:
-    bag = corpus.bag(tmp_path / "bag", MCAP, None)
-    shutil.copyfile(bag / "bag.mcap", bag / "bag_1.mcap")
+    bag = table.READERS["mcap"](tmp_path / "bag")
+    later = [replace(one, stamp=one.stamp + 1000) for one in mcap.demonstration()]
+    mcap.write(bag / "bag_1.mcap", later)
     loaded = load([bag])
     assert any("bag_1.mcap is not listed" in note for note in loaded.notes)
-    assert any("holds 40 messages, and 80 were found" in note for note in loaded.notes)
+    assert any("holds 120 messages, and 160 were found" in note for note in loaded.notes)
+
+
+@pytest.mark.parametrize("other", ["bag_0 (1).mcap", "copy.db3"])
+@pytest.mark.parametrize("listed", [True, False])
+def test_messages_that_are_in_two_files_are_read_once(
+    tmp_path: Path, other: str, *, listed: bool
+) -> None:
+    bag = table.READERS["mcap"](tmp_path / "bag")
+    if other.endswith("db3"):
+        table._database(bag / other, table.DEMONSTRATION.messages).close()
+    else:
+        shutil.copyfile(bag / "bag_0.mcap", bag / other)
+    if not listed:
+        (bag / table.METADATA).unlink()
+    read = read_bag(bag)
+    assert len(read.demonstration) == table.COUNT
+    assert any("holds the same messages as" in note for note in read.notes)
+    assert read.account is not None
+    assert not read.account.missing
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_a_log_whose_database_has_another_name_is_noted(tmp_path: Path, *, listed: bool) -> None:
+    bag = table.READERS["sqlite with a log"](tmp_path / "bag")
+    (bag / "bag_0.db3").rename(bag / "run.db3")
+    if not listed:
+        (bag / table.METADATA).unlink()
+    read = read_bag(bag)
+    assert len(read.demonstration) < table.COUNT
+    assert any(note.startswith("bag_0.db3-wal may hold messages") for note in read.notes)
+
+
+def test_what_stands_behind_the_end_of_an_mcap_file_is_noted(tmp_path: Path) -> None:
+    first = mcap.write(tmp_path / "1.mcap", mcap.demonstration())
+    second = mcap.write(tmp_path / "2.mcap", mcap.demonstration())
+    size = first.stat().st_size
+    first.write_bytes(first.read_bytes() + second.read_bytes())
+    [note] = read_bag(first).notes
+    assert f"goes on for {size} bytes behind its end, which were not read" in note
+    second.write_bytes(second.read_bytes() + bytes(4096))
+    assert read_bag(second).notes == ()
 
 
 def test_a_file_that_is_listed_and_not_there_is_noted(tmp_path: Path) -> None:

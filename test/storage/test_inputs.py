@@ -3,6 +3,7 @@
 import os
 import stat
 import threading
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,9 @@ def test_a_directory_of_bags_is_each_of_them_and_so_is_one_of_tables(tmp_path):
         (b"\x89HDF\r\n", "HDF5"),
         (b"\xd0\xcf\x11\xe0\xa1", "old Excel"),
         (b"BZh91AY", "bunzip2"),
+        (b"\x28\xb5\x2f\xfd\x04", "unzstd"),
+        (b"7z\xbc\xaf\x27", "7z x"),
+        (b"run/".ljust(257, b"\0") + b"ustar\0", "is a tar archive: unpack it with `tar -xf`"),
     ],
 )
 @pytest.mark.parametrize("name", ["one.mcap", "one.db3", "one.bag", "one.csv"])
@@ -120,6 +124,39 @@ def test_what_is_something_else_is_named_with_what_helps(tmp_path, begin, why, n
     (tmp_path / name).write_bytes(begin)
     with pytest.raises(InputError, match=why):
         load([tmp_path / name])
+
+
+@pytest.mark.parametrize(
+    ("inside", "why"),
+    [
+        ("xl/workbook.xml", "is a spreadsheet: save the table as CSV"),
+        ("content.xml", "is a spreadsheet"),
+        ("x.npy", "is an archive of NumPy arrays"),
+        ("run.csv", "unzip"),
+    ],
+)
+def test_what_a_zip_archive_of_another_name_is_its_files_say(
+    tmp_path: Path, inside: str, why: str
+) -> None:
+    with zipfile.ZipFile(tmp_path / "one.csv", "w") as archive:
+        archive.writestr(inside, "")
+    with pytest.raises(InputError, match=why):
+        load([tmp_path / "one.csv"])
+
+
+@pytest.mark.parametrize("name", ["run.tar.gz", "run.TGZ"])
+def test_a_packed_archive_is_unpacked_in_one_go(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"\x1f\x8b\x08")
+    with pytest.raises(InputError, match="is a packed tar archive: unpack it with `tar -xf`"):
+        load([tmp_path / name])
+
+
+@pytest.mark.parametrize("name", ["bag_0.sqlite3", "bag_0", "bag_0.csv"])
+def test_a_file_of_messages_is_read_whatever_it_is_called(tmp_path: Path, name: str) -> None:
+    bag = write_bag(tmp_path / "bag")
+    (file,) = (one for one in bag.iterdir() if one.name != "metadata.yaml")
+    file.rename(tmp_path / name)
+    assert len(load([tmp_path / name]).demonstrations) == 1
 
 
 @pytest.mark.parametrize(

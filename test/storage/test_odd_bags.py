@@ -120,6 +120,19 @@ def test_messages_without_times_are_taken_as_they_stand_with_a_note(
         read_bag(path, sample_rate=10.0)
 
 
+def test_states_without_times_beside_actions_with_some_are_noted(tmp_path: Path) -> None:
+    messages = [replace(one, stamp=one.stamp * one.channel) for one in MESSAGES]
+    [note] = read_bag(mcap.write(tmp_path / "bag.mcap", messages)).notes
+    assert note.startswith("all messages on '/state' were recorded at the same time (0 ns)")
+
+
+def test_actions_by_another_clock_than_the_states_are_called_so(tmp_path: Path) -> None:
+    since = 1_700_000_000_000_000_000
+    messages = [replace(one, stamp=one.stamp + since * (not one.channel)) for one in MESSAGES]
+    with pytest.raises(InputError, match="recorded by another clock"):
+        read_bag(mcap.write(tmp_path / "bag.mcap", messages))
+
+
 def test_times_that_fall_are_sorted(tmp_path: Path) -> None:
     messages = [replace(one, stamp=1000 - one.stamp) for one in MESSAGES]
     path = mcap.write(tmp_path / "bag.mcap", messages, per_chunk=5)
@@ -262,7 +275,11 @@ def test_a_bag_may_have_more_files_than_can_be_open_at_once(tmp_path: Path, suff
     else:
         table._database(bag / "bag_0.db3", MESSAGES).close()
     for number in range(1, count):
-        shutil.copyfile(bag / f"bag_0{suffix}", bag / f"bag_{number}{suffix}")
+        later = [replace(one, stamp=one.stamp + 1000 * number) for one in MESSAGES]
+        if suffix == ".mcap":
+            mcap.write(bag / f"bag_{number}.mcap", later)
+        else:
+            table._database(bag / f"bag_{number}.db3", later).close()
     resource.setrlimit(resource.RLIMIT_NOFILE, (count, hard))
     try:
         read = read_bag(bag)
@@ -329,6 +346,14 @@ def test_metadata_that_a_loss_of_power_left_is_called_what_it_is(
     assert len(read.demonstration) == rows
     [note] = read.notes
     assert f"metadata.yaml cannot be read ({why}" in note
+
+
+def test_a_file_that_is_packed_is_to_be_unpacked_where_it_is_missing(tmp_path: Path) -> None:
+    bag = table.READERS["mcap"](tmp_path / "bag")
+    (file,) = bag.glob("*.mcap")
+    file.rename(bag / f"{file.name}.gz")
+    with pytest.raises(InputError, match=f"or unpack {file.name}.gz"):
+        read_bag(bag)
 
 
 @pytest.mark.parametrize("ending", [".part", ".crdownload", ".active"])

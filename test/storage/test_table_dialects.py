@@ -237,6 +237,45 @@ DIALECTS: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
         ),
         ("'received' numbers or dates the rows",),
     ),
+    "units below the names, without brackets": (
+        _written([["m", "kg", "", "", "cmd"], *_plain()]),
+        ("1 line holds words where all others hold numbers",),
+    ),
+    "types below the names": (
+        _written([["float", "int", "bool", "string", "string"], *_plain()]),
+        ("1 line holds words where all others hold numbers",),
+    ),
+    "other names amid the table": (
+        _written([*_plain()[:30], ["a", "b", "c", "d", "e"], *_plain()[30:]]),
+        ("1 line holds words where all others hold numbers",),
+    ),
+    "groups above the names": (f"pose,,sensors,,\n{_written(_plain())}", ("1 line is a title",)),
+    "groups that are repeated": (
+        f"pose,pose,sensors,sensors,action\n{_written(_plain())}",
+        ("1 line is a title",),
+    ),
+    "text below the table": (
+        f"{_written(_plain())}\nExported by Tool 3.2 on 2026-01-01\nNote:,by hand\n",
+        ("2 lines are text below the table",),
+    ),
+    "the count of psql": (
+        "\n".join([" | ".join(NAMES), "+".join(["---"] * 5), *map(" | ".join, _plain())])
+        + "\n(60 rows)\n",
+        ("separated by bars", "1 line is a ruled line", "1 line is text below the table"),
+    ),
+    "a separator behind the last name": (_written(_plain(), [*NAMES, ""]), ()),
+    "the end of a file of DOS": (f"{_written(_plain())}\x1a", ()),
+    "hexadecimal numbers": (
+        _written(_each(lambda column, cell: hex(int(cell)) if column == 1 else cell)),
+        ("'load' is read as numbers, which are hexadecimal",),
+    ),
+    "a long remark in a cell": (
+        _written(
+            [[f"{place}: {'a' * 200_000}", *row] for place, row in enumerate(_plain())],
+            ["said", *NAMES],
+        ),
+        ("'said' holds 60 different texts",),
+    ),
     "utf-32": (_written(_plain()).encode("utf-32"), ()),
     "utf-16 without a mark": (_written(_plain()).encode("utf-16-le"), ()),
     "utf-16 of another order without a mark": (_written(_plain()).encode("utf-16-be"), ()),
@@ -277,7 +316,7 @@ def test_however_a_table_is_written_it_is_the_same_demonstration(
 def _decoded(content: str | bytes, dialect: str) -> str:
     """The text of a table."""
     if isinstance(content, str):
-        return content.replace("\ufeff", "")
+        return content.replace("\ufeff", "").removesuffix("\x1a")
     if dialect == "Windows-1252":
         return content.decode("cp1252")
     for encoding in ("utf-32", "utf-16"):
@@ -318,6 +357,7 @@ def test_a_last_word_that_may_be_cut_off_is_noted(tmp_path: Path, end: str, note
         ("<!DOCTYPE html>\n<html></html>\n", "is HTML or XML"),
         ("x,action\n1,前進\n2,go\n".encode("shift_jis"), "is not UTF-8"),
         ("x,action\n1,Привет\n2,go\n".encode("cp1251"), "is not UTF-8"),
+        ("x,action\n1,go\n".encode("utf-16")[:-1], "ends inside of a character"),
     ],
 )
 def test_what_is_no_table_as_it_stands_is_called_what_it_is(
@@ -325,6 +365,50 @@ def test_what_is_no_table_as_it_stands_is_called_what_it_is(
 ) -> None:
     with pytest.raises(InputError, match=said):
         _read(tmp_path, text)
+
+
+def test_names_that_recur_stand_behind_those_of_their_groups(tmp_path: Path) -> None:
+    read = _read(tmp_path, "pose,,goal,,\nx,y,x,y,action\n1,2,3,4,go\n5,6,7,8,turn\n")
+    names = [feature.name for feature in read.demonstration.features]
+    assert names == ["pose.x", "pose.y", "goal.x", "goal.y"]
+    assert read.demonstration.actions == ("go", "turn")
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        # Sensors that fail, a last row that was cut off, and words in a single column.
+        ["1,2,go", "3,4,stop", "ERR,ERR,stop", "5,6,go"],
+        ["1,2,go", "3,4,stop", "ERR,4,halt", "5,6,go"],
+    ],
+)
+def test_rows_with_words_in_place_of_numbers_are_rows(rows: list[str], tmp_path: Path) -> None:
+    read = _read(tmp_path, "\n".join(["x,y,a", *rows]) + "\n")
+    assert len(read.demonstration) == 4
+    assert not any("holds words" in note for note in read.notes)
+
+
+@pytest.mark.parametrize("last", ["gre", "green", "3.", "3,4"])
+def test_a_last_row_that_was_cut_off_is_no_text_below_the_table(last: str, tmp_path: Path) -> None:
+    rows = ["1,2,go", "3,4,stop"] if last[0] == "3" else ["green,2,go", "red,4,stop"]
+    with pytest.raises(InputError, match="if it was cut off"):
+        _read(tmp_path, "\n".join(["x,y,a", *rows, last]))
+
+
+def test_texts_that_nobody_could_read_are_no_feature(tmp_path: Path) -> None:
+    long = "a" * 2000
+    read = _read(tmp_path, f"x,said,a\n1,{long},go\n2,{long},turn\n")
+    assert [feature.name for feature in read.demonstration.features] == ["x"]
+    assert read.notes == ("column 'said' holds texts of up to 2000 characters, and is no feature",)
+
+
+@pytest.mark.parametrize("name", ["label", "Command", "class"])
+def test_a_column_that_is_called_like_labels_and_is_not_the_last_is_noted(
+    name: str, tmp_path: Path
+) -> None:
+    read = _read(tmp_path, f"{name},x,color\n" + "go,1,red\nturn,2,blue\n" * 4)
+    assert read.demonstration.actions == ("blue", "red")
+    assert f"{name!r} is a feature: name the label column if it is that one" in read.notes[0]
 
 
 def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Path) -> None:

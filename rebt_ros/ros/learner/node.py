@@ -64,6 +64,9 @@ _LOOK: Final = 1.0
 #: So many notes are part of the answer; all of them are in the log.
 _NOTES_ANSWERED: Final = 3
 
+#: A tree of a smaller share of the rows of the one before it may lack demonstrations.
+_FAR_FEWER: Final = 0.5
+
 #: How long the end of the node waits for a call that is under way (seconds).
 _LAST_ANSWER: Final = 1.0
 
@@ -164,9 +167,10 @@ class LearnerNode(Node):
             )
             return response
         try:
-            response.message = self._learn(call)
+            response.message, doubts = self._learn(call)
             response.success = True
-            self._end(Level.OK, response.message)
+            self._last = Report(Level.WARN if doubts else Level.OK, response.message)
+            self.get_logger().info(response.message)
         except LearningCancelledError as err:
             response.message = str(err)
             self._end(Level.OK, response.message)
@@ -191,16 +195,18 @@ class LearnerNode(Node):
         return response
 
     def _end(self, level: Level, message: str) -> None:
-        """Notes how a call ended."""
+        """Notes how a call ended, unless it ended with the node."""
         self._last = Report(level, message)
+        if not self.context.ok():
+            return
         # On two lines: rclpy refuses another severity from the same one.
         if level is Level.OK:
             self.get_logger().info(message)
         else:
             self.get_logger().error(message)
 
-    def _learn(self, call: _Call) -> str:
-        """Learns, writes and publishes; returns what a person wants to know."""
+    def _learn(self, call: _Call) -> tuple[str, Sequence[str]]:
+        """Learns, writes and publishes; returns what a person wants to know, and what to doubt."""
         if why := self._unwritable():
             raise LearningError(f"nothing was learned: {why}.")
         self._ended.learn()
@@ -225,11 +231,28 @@ class LearnerNode(Node):
             if call.cancelled.is_set():
                 raise LearningCancelledError
             call.progress = _PUBLISHING
+        fewer = self._fewer(learned)
+        for doubt in fewer:
+            self.get_logger().warning(f"{doubt}.")
         self._put_out(path, learned, lesson.document, lesson.figures)
         # Nobody has to wait for pictures.
         threading.Thread(target=self._write_files, args=[path.parent], daemon=True).start()
+        notes = (*fewer, *lesson.notes)
         return (
-            f"{lesson.sentence} It is published and in {path}.{unjudged}{_in_short(lesson.notes)}"
+            f"{lesson.sentence} It is published and in {path}.{unjudged}{_in_short(notes)}",
+            (*fewer, *lesson.doubts),
+        )
+
+    def _fewer(self, learned: LearnedTree) -> tuple[str, ...]:
+        """That a tree of far more rows is replaced, without a full stop; else nothing."""
+        rows = learned.provenance.rows
+        before = self._learned.provenance.rows if self._learned is not None else None
+        if before is None or rows >= _FAR_FEWER * before:
+            return ()
+        return (
+            f"it was learned from {rows} rows, and the tree before it from {before}: see whether "
+            f"demonstrations are missing from {self._settings.demonstrations().absolute()}; "
+            "~/rollback publishes the tree before",
         )
 
     def _log(self, notes: Sequence[str]) -> None:

@@ -174,7 +174,7 @@ class RecorderNode(Node):
         for take in self._order.flush(self._complete(time.monotonic_ns())):
             take()
         # The node's own logger publishes what it says, and a signal shuts the context down.
-        logger = get_logger("rebt_ros")
+        logger = get_logger(f"{self.get_logger().name}.stop")
         if self._order.held:
             logger.warning(
                 f"{self._order.held} actions are left out: the states that they belong to had not "
@@ -182,8 +182,11 @@ class RecorderNode(Node):
             )
         if self._session.recording:
             answer = self._session.stop(self._stamp(time.time_ns()))
-            log = logger.info if answer.success else logger.error
-            log(answer.message)
+            # On two lines: rclpy refuses another severity from the same one.
+            if answer.success:
+                logger.info(answer.message)
+            else:
+                logger.warning(answer.message)
 
     def _open_writer(self, features: tuple[Feature, ...], origin: Origin) -> Writer:
         settings = self._settings
