@@ -10,20 +10,30 @@ order: each is reached only if all earlier ones failed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rebt_ros.arrays import BoolArray, WordArray, in_parts
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import States, history_columns
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import Condition, Interval, Literal, Threshold
+from rebt_ros.logic.conditions import (
+    Condition,
+    Interval,
+    LastActionIs,
+    Literal,
+    PreviousActionIs,
+    Threshold,
+)
 from rebt_ros.paper.rule_trees import sequence
 
 #: Conditions in a word.
 _BITS: Final = 64
+#: Of so many conditions, a bit for every combination takes no room (64 kB).
+_FEW: Final = 16
 
 
 def without_needless_conditions(
@@ -220,19 +230,52 @@ def _distinct(
     conditions: Sequence[Condition], table: DemonstrationTable, shown: BoolArray | None
 ) -> tuple[int, list[int]]:
     """The number of cells that the conditions distinguish, and the set that satisfies each."""
+    if len(conditions) <= _FEW:
+        return _distinct_of_few(conditions, table, shown)
     kinds = np.empty((0, -(-len(conditions) // _BITS)), dtype=np.uint64)
-    for rows in in_parts(len(table)):
-        history = history_columns(table.actions, table.previous[rows], table.last[rows])
-        states = States(table.features, table.states[rows], history)
+    for rows, states in _in_parts(conditions, table):
         holds = np.empty((len(states), len(conditions)), dtype=bool)
         for place, condition in enumerate(conditions):
             holds[:, place] = states.satisfy(Literal(condition))
         kinds = _different(
             np.concatenate([kinds, _words(holds if shown is None else holds[shown[rows]])])
         )
-    satisfied = np.unpackbits(kinds.view(np.uint8), axis=1, count=len(conditions))
+    return _as_sets(np.unpackbits(kinds.view(np.uint8), axis=1, count=len(conditions)))
+
+
+def _distinct_of_few(
+    conditions: Sequence[Condition], table: DemonstrationTable, shown: BoolArray | None
+) -> tuple[int, list[int]]:
+    """The same for conditions of which every combination has a place in a short list."""
+    occurs = np.zeros(1 << len(conditions), dtype=bool)
+    for rows, states in _in_parts(conditions, table):
+        kind = np.zeros(len(states), dtype=np.uint16)
+        for place, condition in enumerate(conditions):
+            kind |= states.satisfy(Literal(condition)).astype(np.uint16) << np.uint16(place)
+        occurs[kind if shown is None else kind[shown[rows]]] = True
+    kinds = np.flatnonzero(occurs)[:, np.newaxis]
+    return _as_sets(((kinds >> np.arange(len(conditions))) & 1).astype(np.uint8))
+
+
+def _in_parts(
+    conditions: Sequence[Condition], table: DemonstrationTable
+) -> Iterator[tuple[slice, States]]:
+    """The rows of a large table part by part, and what is known of their states."""
+    looks_back = any(isinstance(one, LastActionIs | PreviousActionIs) for one in conditions)
+    for rows in in_parts(len(table)):
+        last = table.last[rows] if looks_back else table.previous[rows]
+        history = history_columns(table.actions, table.previous[rows], last)
+        yield rows, States(table.features, table.states[rows], history)
+
+
+def _as_sets(satisfied: NDArray[np.uint8]) -> tuple[int, list[int]]:
+    """Cells as bits of sets: how many there are, and which satisfy each condition.
+
+    Args:
+        satisfied: Whether a cell satisfies a condition, shape (cells, conditions).
+    """
     sets = np.packbits(satisfied, axis=0, bitorder="little")
-    return len(kinds), [int.from_bytes(column.tobytes(), "little") for column in sets.T]
+    return len(satisfied), [int.from_bytes(column.tobytes(), "little") for column in sets.T]
 
 
 def _words(holds: BoolArray) -> WordArray:

@@ -118,7 +118,12 @@ def _noticeable(findings: Findings, wording: Wording, most: int) -> Iterator[str
 
 
 def _divergences(comparison: Comparison, most: int) -> Iterator[str]:
-    if not comparison.divergences:
+    if not comparison.complete:
+        yield (
+            "there may be more: the branches overlap in too many ways to look at each, so that "
+            "whether the trees do the same elsewhere is unknown."
+        )
+    elif not comparison.divergences:
         yield "both do the same in every state."
     if not comparison.exact:
         yield "overestimated: of some states below it is not known whether they exist."
@@ -126,7 +131,10 @@ def _divergences(comparison: Comparison, most: int) -> Iterator[str]:
         yield "in a first tick; later ones may differ elsewhere, as a tree remembers where it was."
     for divergence in comparison.divergences:
         what = f"{action_text(divergence.mine)} instead of {action_text(divergence.other)}"
-        yield from regions(what, divergence.boxes, comparison.grid, most)
+        if divergence.boxes.shape[1]:
+            yield from regions(what, divergence.boxes, comparison.grid, most)
+        else:
+            yield f"{what}: where is unknown"
         if divergence.rows is not None:
             rows = (
                 "1 row that was shown lies"

@@ -265,13 +265,9 @@ def _compared(
     reached = np.empty(len(table), dtype=np.int64)
     for rows in in_parts(len(table)):
         values = _Values(grown, table, vocabulary, rows)
-        node = reached[rows]
-        node[:] = 0
-        under_way = np.arange(len(node))
-        while (under_way := under_way[grown.left[node[under_way]] >= 0]).size:
-            at = node[under_way]
-            left = values.of(under_way, grown.column[at]) <= thresholds[at]
-            node[under_way] = np.where(left, grown.left[at], grown.right[at])
+        for node, here, at_split in values.passed(thresholds):
+            if at_split is None:
+                reached[rows.start + here] = node
     return reached
 
 
@@ -293,15 +289,11 @@ def _gaps(
         values = _Values(grown, table, vocabulary, rows)
         for column, its in values.largest():
             largest[column] = max(largest.get(column, 0.0), its)
-        node = np.zeros(rows.stop - rows.start, dtype=np.int64)
-        under_way = np.arange(len(node))
-        while (under_way := under_way[grown.left[node[under_way]] >= 0]).size:
-            at = node[under_way]
-            value = values.of(under_way, grown.column[at])
-            left = value <= thresholds[at]
-            np.maximum.at(low, at[left], value[left])
-            np.minimum.at(high, at[~left], value[~left])
-            node[under_way] = np.where(left, grown.left[at], grown.right[at])
+        for node, _, at_split in values.passed(thresholds):
+            if at_split is not None:
+                left, right = at_split
+                low[node] = np.max(left, initial=low[node])
+                high[node] = np.min(right, initial=high[node])
     return low, high, largest
 
 
@@ -311,6 +303,8 @@ class _Values:
     def __init__(
         self, grown: GrownTree, table: DemonstrationTable, vocabulary: Vocabulary, rows: slice
     ) -> None:
+        self._grown = grown
+        self._rows = rows.stop - rows.start
         self._columns = {}
         split = set(grown.column.tolist())
         for place, asked in enumerate(columns(table, vocabulary)):
@@ -323,13 +317,33 @@ class _Values:
         for place, its in self._columns.items():
             yield place, float(np.max(np.abs(its), initial=0.0, where=np.isfinite(its)))
 
-    def of(self, rows: IntArray, column: IntArray) -> FloatArray:
-        """The value of one column in each of the rows, shape (rows,)."""
-        values = np.empty(len(rows))
-        for place, its in self._columns.items():
-            here = column == place
-            values[here] = its[rows[here]]
-        return values
+    def passed(
+        self, thresholds: FloatArray
+    ) -> Iterator[tuple[int, IntArray, tuple[FloatArray, FloatArray] | None]]:
+        """The nodes that some rows reach.
+
+        Args:
+            thresholds: What each node compares with, shape (nodes,).
+
+        Yields:
+            A node, the rows that reach it, and at a split, their values: of those that go left, and
+            of those that go right.
+        """
+        grown, under_way = self._grown, [(0, np.arange(self._rows))]
+        while under_way:
+            node, here = under_way.pop()
+            if not len(here):
+                continue
+            if grown.left[node] < 0:
+                yield node, here, None
+                continue
+            values = self._columns[int(grown.column[node])][here]
+            left = values <= thresholds[node]
+            yield node, here, (values[left], values[~left])
+            under_way += [
+                (int(grown.left[node]), here[left]),
+                (int(grown.right[node]), here[~left]),
+            ]
 
 
 def _asked(asked: Number | Indicator, table: DemonstrationTable, rows: slice) -> FloatArray:

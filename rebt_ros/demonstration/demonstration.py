@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -85,6 +86,12 @@ class Demonstration:
 
     def __len__(self) -> int:
         return len(self.chosen)
+
+    def lacks(self, feature: int) -> bool:
+        """Whether a feature has no value in any row, by its position."""
+        values = self.states[:, feature]
+        # The first row almost always tells, many times as fast.
+        return not len(values) or (math.isnan(values[0]) and bool(np.isnan(values).all()))
 
     def part(self, name: str, rows: slice) -> Demonstration:
         """Some of its rows that follow each other, as a demonstration of their own."""

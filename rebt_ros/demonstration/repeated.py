@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -9,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rebt_ros.arrays import IntArray
+from rebt_ros.arrays import BoolArray, IntArray
 from rebt_ros.demonstration.demonstration import Demonstration
 
 #: Demonstrations that share more of their rows are the same one (share of the shorter one).
@@ -40,7 +41,12 @@ def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
     """
     tell_time = [len(one.stamps) and one.stamps.min() >= _FIRST_TIME for one in demonstrations]
     part = sum(len(one.stamps) for one in demonstrations) // _MOST + 1
-    hashes = [_hashes(one, part) for one in demonstrations]
+    # Those of many rows are looked into where they may share some.
+    worth = _may_share(demonstrations) if part > 1 else np.ones(len(demonstrations), dtype=bool)
+    hashes = [
+        _hashes(one, part) if may else np.zeros(0, np.uint64)
+        for one, may in zip(demonstrations, worth.tolist(), strict=True)
+    ]
     for one, found in zip(demonstrations, hashes, strict=True):
         again = len(one.stamps) - len(found)
         if part == 1 and again >= max(_FEWEST, _SAME * len(found)):
@@ -64,6 +70,38 @@ def repeated(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
         yield f"{more} more pairs of demonstrations share rows"
 
 
+def _may_share(demonstrations: Sequence[Demonstration]) -> BoolArray:
+    """Which demonstrations may share as many rows with another one as is told of.
+
+    Those with times overlap it in time; those without have the same first and last stamps, and the
+    same rows there.
+    """
+    ends = [_ends(one) for one in demonstrations]
+    alone = Counter(ends)
+    span = np.array([[*end[:2]] for end in ends], dtype=np.int64).reshape(-1, 2)
+    first, last = span.T
+    timed = first >= _FIRST_TIME
+    order = np.argsort(first, kind="stable")
+    latest = np.maximum.accumulate(last[order])
+    overlaps = np.zeros(len(ends), dtype=bool)
+    overlaps[order[1:]] = first[order[1:]] <= latest[:-1]
+    overlaps[order[:-1]] |= first[order[1:]] <= last[order[:-1]]
+    twin = np.array([alone[end] > 1 for end in ends], dtype=bool)
+    # One with times may share rows with one that began before them, such as at 0.
+    around = timed.any() & (last >= _FIRST_TIME)
+    return np.asarray(overlaps & (timed | around) | twin)
+
+
+def _ends(demonstration: Demonstration) -> tuple[int, int, bytes]:
+    """The first and last stamp, and where stamps rise, the states of the rows with them."""
+    stamps = demonstration.stamps
+    if not len(stamps):
+        return 0, 0, b""
+    # Adding 0 gives both zeros the same bits.
+    rows = demonstration.states[[0, -1]] + 0.0 if (stamps[1:] > stamps[:-1]).all() else np.empty(0)
+    return int(stamps.min()), int(stamps.max()), rows.tobytes()
+
+
 def _hashes(demonstration: Demonstration, part: int) -> Hashes:
     """A number for each distinct row, or for one in so many."""
     mixed = demonstration.stamps.astype(np.uint64)
@@ -83,7 +121,12 @@ def _columns(demonstration: Demonstration) -> Iterator[Hashes]:
 
 
 def _texts(texts: Sequence[str]) -> Hashes:
-    return np.array([hash(text) & 0xFFFFFFFFFFFFFFFF for text in texts], np.uint64)
+    # Unlike those of Python, these are the same in every process.
+    digests = (
+        hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=8).digest()
+        for text in texts
+    )
+    return np.frombuffer(b"".join(digests), dtype="<u8").astype(np.uint64)
 
 
 def _shared(hashes: Hashes, owner: IntArray) -> Counter[tuple[int, int]]:

@@ -46,8 +46,6 @@ class DemonstrationTable:
     """Position in `demonstrations` of each row's demonstration, ascending, shape (rows,)."""
     stamps: IntArray
     """Nanoseconds, shape (rows,)."""
-    last: IntArray = field(init=False)
-    """Position in `actions` of each row's LAT, `NO_ACTION` for none, shape (rows,)."""
     before: IntArray | None = None
     """LAT of each demonstration's first row, as in `last`, shape (demonstrations,), or None."""
     previous: IntArray = None  # type: ignore[assignment]
@@ -58,13 +56,27 @@ class DemonstrationTable:
     """How often the rows of each demonstration count, shape (demonstrations,); None for once."""
     robot: object = None
     """The `RobotFile` that its rows were read with, for trees to carry; None without one."""
+    _last: list[IntArray] = field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
         if self.previous is None:
             previous = previous_actions(self.chosen, self.demonstration)
             object.__setattr__(self, "previous", previous)
-        last = last_actions(self.chosen, self.demonstration, self.before)
-        object.__setattr__(self, "last", last)
+
+    @property
+    def last(self) -> IntArray:
+        """Position in `actions` of each row's LAT, `NO_ACTION` for none, shape (rows,)."""
+        # Most parts of a large table are never asked for it.
+        if not self._last:
+            self._last.append(last_actions(self.chosen, self.demonstration, self.before))
+        return self._last[0]
+
+    @property
+    def begins(self) -> IntArray:
+        """The first row of each demonstration that has rows, shape (shown,)."""
+        numbers = self.demonstration
+        after = np.flatnonzero(numbers[1:] != numbers[:-1]) + 1
+        return np.concatenate([np.zeros(min(len(self), 1), dtype=np.int64), after])
 
     def __len__(self) -> int:
         return len(self.chosen)
@@ -114,9 +126,9 @@ class DemonstrationTable:
     def _before_parts(self, rows: BoolArray) -> IntArray | None:
         if self.before is None:
             return None
-        present, first = np.unique(self.demonstration, return_index=True)
+        first = self.begins
         before = self.before.copy()
-        before[present[~rows[first]]] = NO_ACTION
+        before[self.demonstration[first[~rows[first]]]] = NO_ACTION
         return before
 
     def held_out(self, fraction: float) -> BoolArray:
@@ -129,13 +141,12 @@ class DemonstrationTable:
             fraction: Share of the rows to hold out, in [0, 1), as nearly as whole demonstrations
                 allow; at least one row, or demonstration, if above 0.
         """
-        shown = np.unique(self.demonstration)
         if fraction == 0 or len(self) < 2:
             return np.zeros(len(self), dtype=bool)
-        if len(shown) == 1:
-            return np.arange(len(self)) >= _share_kept(len(self), fraction)
         # Where each demonstration but the first begins, the last one first.
-        begins = np.searchsorted(self.demonstration, shown[:0:-1])
+        begins = self.begins[:0:-1]
+        if not len(begins):
+            return np.arange(len(self)) >= _share_kept(len(self), fraction)
         nearest = np.argmin(np.abs(len(self) - begins - fraction * len(self)))
         return np.arange(len(self)) >= int(begins[nearest])
 
@@ -177,11 +188,14 @@ def part_of(table: DemonstrationTable, rows: int) -> DemonstrationTable:
     """
     if len(table) <= rows:
         return table
-    shown, position = np.unique(table.demonstration, return_inverse=True)
-    if len(shown) == 1:
+    begins = table.begins
+    shown = len(begins)
+    if shown == 1:
         return table.where(np.arange(len(table)) < rows)
-    kept = max(2, len(shown) * rows // len(table))
-    return table.where(np.isin(position, np.arange(kept) * len(shown) // kept))
+    kept = max(2, shown * rows // len(table))
+    inside = np.zeros(shown, dtype=bool)
+    inside[np.arange(kept) * shown // kept] = True
+    return table.where(np.repeat(inside, np.diff(begins, append=len(table))))
 
 
 def tabulate(
@@ -359,7 +373,7 @@ def _telling(place: int, demonstrations: Sequence[Demonstration]) -> tuple[Featu
     found = [
         demonstration.features[place]
         for demonstration in demonstrations
-        if not np.isnan(demonstration.states[:, place]).all()
+        if not demonstration.lacks(place)
     ]
     return tuple(found or (demonstrations[0].features[place],))
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from rebt_ros.demonstration.demonstration import Demonstration
 from rebt_ros.errors import listing
 
@@ -27,7 +25,7 @@ def valueless(demonstrations: Sequence[Demonstration]) -> Iterator[str]:
         if not len(one.stamps):
             continue
         for place, feature in enumerate(one.features):
-            if feature.topic and np.isnan(one.states[:, place]).all():
+            if feature.topic and one.lacks(place):
                 lacking.setdefault((feature.name, feature.topic), []).append(one.name)
     for (name, topic), those in sorted(lacking.items()):
         if len(those) == len(demonstrations):

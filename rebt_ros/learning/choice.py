@@ -145,7 +145,7 @@ def _level(levels: JudgedLevels, shown: DemonstrationTable) -> tuple[float, str]
     """The ``ccp_alpha`` to prune at, and why."""
     begun = int(np.count_nonzero(shown.previous != shown.chosen))
     # Each stretch of a demonstration may be a part of the task that no other stretch shows.
-    if len(np.unique(shown.demonstration)) == 1 and begun < levels.shown.size:
+    if len(shown.begins) == 1 and begun < levels.shown.size:
         return 0.0, (
             f"One demonstration in which actions are begun {begun} times does not tell how far to "
             "prune: the tree is not pruned."

@@ -262,7 +262,7 @@ def as_learned(
         evaluation.actions_of(table),
         tree,
         Provenance(
-            demonstrations=len(np.unique(table.demonstration)),
+            demonstrations=len(table.begins),
             rows=len(table),
             delta=options.delta,
             max_depth=options.max_depth,

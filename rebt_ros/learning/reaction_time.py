@@ -192,7 +192,7 @@ def _most(table: DemonstrationTable, gap: float | None) -> tuple[str, int]:
         return "no reaction time can be found if the action is always the same", 0
     if not evenly_spaced(table):
         return "no reaction time can be found in rows that are not evenly spaced", 0
-    lengths = np.unique(table.demonstration, return_counts=True)[1]
+    lengths = np.diff(table.begins, append=len(table))
     enough = int(float(np.median(lengths)) * _LOST)
     # The tolerance keeps jitter from excluding the last delay.
     most = min(enough, _MOST_ROWS if gap is None else math.floor(_LATEST / gap + 0.1))

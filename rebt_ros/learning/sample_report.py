@@ -78,7 +78,7 @@ def report_on_sample(
         len(rows),
         len(table),
         sample.demonstrations,
-        len(np.unique(table.demonstration)),
+        len(table.begins),
         sample.complete,
         _fit(hits, rows.counts(rows.chosen, actions)),
         _fit(_counted_hits(trained), trained.grown.counts[0]),

@@ -85,8 +85,13 @@ def gather(sources: Sequence[Source], reading: Reading, options: InputOptions) -
     cache = None if plan.cache is None else ReadCache(plan.cache)
     keys = {}
     if cache is not None and plan.scheduler is None:
+        # Of a fleet, these are the same for all inputs of a kind.
+        deciding = {
+            kind: reading.deciding(kind, options) for kind in {source.kind for source in sources}
+        }
         keys = {
-            place: _key(source, reading, options, cache) for place, source in enumerate(sources)
+            place: _key(source, deciding[source.kind], cache)
+            for place, source in enumerate(sources)
         }
     spool = Spool()
     answers: dict[int, Read | RebtError] = {}
@@ -199,7 +204,7 @@ def _fetched(
     directory = options.plan.cache
     cache = None if directory is None else ReadCache(directory)
     if cache is not None and key is None:
-        key = _key(source, reading, options, cache)
+        key = _key(source, reading.deciding(source.kind, options), cache)
         if key and cache.get(key, source, options.robot) is not None:
             return _Fetched(place, key, is_cached=True)
     reasons: list[str] = []
@@ -254,12 +259,12 @@ def _elsewhere(plan: ReadingPlan) -> RebtError:
     )
 
 
-def _key(source: Source, reading: Reading, options: InputOptions, cache: ReadCache) -> str:
+def _key(source: Source, deciding: tuple[object, ...], cache: ReadCache) -> str:
     """The key of an input in a cache; empty where it is not kept, or cannot be read."""
     if not is_kept(source):
         return ""
     try:
-        return cache.key_of(source, reading.deciding(source.kind, options))
+        return cache.key_of(source, deciding)
     except OSError:
         return ""
 

@@ -10,10 +10,10 @@ import re
 import stat
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from rebt_ros.robot_file.robot_file import RobotFile
 from rebt_ros.storage.atomic import replace_with
@@ -82,8 +82,7 @@ def key_of(source: Source, deciding: tuple[object, ...]) -> str:
     return digest.hexdigest()
 
 
-@dataclass(frozen=True, slots=True)
-class FileState:
+class FileState(NamedTuple):
     """What changes where somebody writes to a file, or puts another one in its place."""
 
     name: str
@@ -106,18 +105,24 @@ def state_of(source: Source) -> tuple[FileState, ...]:
     Raises:
         OSError: It cannot be looked at.
     """
-    return tuple(
-        FileState(
-            file.name,
-            status.st_size,
-            status.st_mtime_ns,
-            status.st_ctime_ns,
-            status.st_ino,
-            status.st_dev,
-            stat.S_ISREG(status.st_mode),
-        )
-        for file in _files(source.path)
-        for status in (file.lstat(),)
+    try:
+        with os.scandir(source.path) as entries:
+            # As `_files` has them.
+            inside = sorted(entries, key=lambda one: one.name)
+            return tuple(_state(one.name, one.stat(follow_symlinks=False)) for one in inside)
+    except NotADirectoryError:
+        return tuple(_state(file.name, file.lstat()) for file in _files(source.path))
+
+
+def _state(name: str, status: os.stat_result) -> FileState:
+    return FileState(
+        name,
+        status.st_size,
+        status.st_mtime_ns,
+        status.st_ctime_ns,
+        status.st_ino,
+        status.st_dev,
+        stat.S_ISREG(status.st_mode),
     )
 
 

@@ -21,7 +21,7 @@ from rebt_ros.demonstration.last_action import History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
 from rebt_ros.learning import evaluation
-from rebt_ros.logic.conditions import Interval, IsTrue, Literal
+from rebt_ros.logic.conditions import Condition, Interval, IsTrue, Literal
 from rebt_ros.paper.rules import leaf_rules
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
@@ -176,6 +176,24 @@ def _with_a_condition_less(tree: nodes.Node) -> Iterator[nodes.Node]:
 
 def _only_tells(node: nodes.Node) -> bool:
     return not nodes.actions(node)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(some.conditions(), max_size=9, unique=True), some.tables(), st.booleans())
+def test_few_conditions_tell_the_rows_apart_as_many_do(
+    conditions: list[Condition], table: DemonstrationTable, some_count: bool
+) -> None:
+    shown = np.arange(len(table)) % 3 > 0 if some_count else None
+    few = needless_conditions._distinct(conditions, table, shown)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(needless_conditions, "_FEW", -1)
+        many = needless_conditions._distinct(conditions, table, shown)
+    assert _cells(*few) == _cells(*many)
+
+
+def _cells(count: int, satisfied: list[int]) -> list[list[bool]]:
+    """Cells by the conditions that each of them satisfies."""
+    return sorted([bool(its >> cell & 1) for its in satisfied] for cell in range(count))
 
 
 @pytest.mark.parametrize("count", [0, 1, 63, 64, 65, 200])

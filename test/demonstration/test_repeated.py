@@ -84,6 +84,35 @@ def test_a_part_of_many_rows_tells(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 1200 < count < 2800
 
 
+_parts = st.tuples(
+    st.integers(0, 40), st.integers(0, 30), st.sampled_from((_BEGIN, 0, 10_000_000_000, -(10**9)))
+)
+
+
+@given(st.lists(_parts, min_size=1, max_size=6), st.data())
+def test_of_many_rows_those_that_are_not_looked_into_share_none(
+    parts: list[tuple[int, int, int]], data: st.DataObject
+) -> None:
+    shown = [
+        _shown(f"run_{place}", first, rows, begin=begin)
+        for place, (first, rows, begin) in enumerate(parts)
+    ]
+    copied = data.draw(st.lists(st.sampled_from(shown), max_size=3))
+    shown += [replace(one, name=f"copy_{place}") for place, one in enumerate(copied)]
+    with pytest.MonkeyPatch.context() as patched:
+        # Every row is compared, as if there were many.
+        patched.setattr(module, "_MOST", 1)
+        patched.setattr(module, "_hashes", lambda one, part, hashes=module._hashes: hashes(one, 1))
+        found = list(repeated(shown))
+        everything = np.ones(len(shown), dtype=bool)
+        patched.setattr(module, "_may_share", lambda demonstrations: everything)
+        assert list(repeated(shown)) == found
+
+
+def test_texts_have_the_same_numbers_in_every_process() -> None:
+    assert module._texts(("go", "stop")).tolist() == [11176960828788041012, 15668649924750310089]
+
+
 def test_without_demonstrations_there_is_nothing_to_say() -> None:
     assert list(repeated([])) == []
 

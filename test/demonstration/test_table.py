@@ -45,6 +45,24 @@ def column(values: Sequence[float], feature: Feature | None = None) -> Demonstra
     return shown("one", [(value,) for value in values], "a" * len(values), [feature])
 
 
+@given(some.tables())
+def test_demonstrations_begin_where_their_number_changes(table: DemonstrationTable) -> None:
+    numbers, first = np.unique(table.demonstration, return_index=True)
+    assert table.begins.tolist() == first.tolist()
+    assert table.demonstration[table.begins].tolist() == numbers.tolist()
+
+
+@pytest.mark.parametrize(
+    ("values", "lacks"),
+    [([math.nan, math.nan], True), ([math.nan, 1.0], False), ([1.0, math.nan], False), ([], True)],
+)
+def test_a_feature_is_lacking_without_a_value_in_any_row(values: list[float], lacks: bool) -> None:
+    states = np.array([[value, 0.0] for value in values]).reshape(-1, 2)
+    rows = [Row(0, "m", "a", None, tuple(state)) for state in states.tolist()]
+    one = Demonstration.from_rows("one", (Feature("f0"), Feature("f1")), rows)
+    assert one.lacks(0) is lacks
+
+
 # --- kinds of features ------------------------------------------------------------------------
 
 

@@ -20,7 +20,7 @@ from rebt_ros.demonstration.schema import Feature
 from rebt_ros.errors import InputError, OptionError
 from rebt_ros.storage import gathering, inputs, read_cache
 from rebt_ros.storage.gathering import time_left
-from rebt_ros.storage.input_options import Aside, InputOptions, ReadingPlan, Source
+from rebt_ros.storage.input_options import Aside, InputKind, InputOptions, ReadingPlan, Source
 from rebt_ros.storage.inputs import Loaded, load
 from rebt_ros.storage.read import Read
 from rebt_ros.storage.read_cache import default_cache
@@ -125,6 +125,33 @@ def test_an_input_is_read_once(fleet: Path, tmp_path: Path, readings: list[str])
     # Why one cannot be read may not last.
     assert readings == ["run_3"]
     assert_equal(loaded(fleet), first)
+
+
+def test_what_decides_about_rows_is_asked_once_for_all_inputs_of_a_kind(
+    fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+
+    def deciding(kind: InputKind, options: InputOptions) -> tuple[object, ...]:
+        asked.append(kind)
+        return inputs._deciding_options(kind, options)
+
+    reading = gathering.Reading(inputs._read_source, deciding)
+    monkeypatch.setattr(inputs, "_READING", reading)
+    loaded(fleet, cache=tmp_path / "cache")
+    assert asked == [InputKind.BAG]
+
+
+def test_the_state_of_a_directory_is_that_of_its_files_in_their_order(fleet: Path) -> None:
+    bag = fleet / "run_0"
+    for name in ("b", "B", "a.txt", "run_0.mcap-", "ä", "run_0"):
+        (bag / name).write_text(name)
+    (bag / "link").symlink_to(bag / "a.txt")
+    (bag / "nowhere").symlink_to(bag / "none")
+    found = read_cache.state_of(Source(bag, InputKind.BAG))
+    assert [one.name for one in found] == [file.name for file in sorted(bag.iterdir())]
+    assert [one.number for one in found] == [file.lstat().st_ino for file in sorted(bag.iterdir())]
+    assert {one.name for one in found if not one.is_plain} == {"link", "nowhere"}
 
 
 def test_only_what_is_new_or_different_is_read_again(

@@ -11,7 +11,8 @@ from rebt_ros.behavior_tree import nodes
 from rebt_ros.commands import check
 from rebt_ros.demonstration.schema import Feature
 from rebt_ros.storage.tree_file import write_tree
-from rebt_ros.verification import proof, sweep
+from rebt_ros.verification import comparing, proof, sweep
+from rebt_ros.verification.errors import TooManyPartsError
 
 GO, GRASP, TURN, WAIT = some.ACTIONS
 NEAR = some.at_most("distance", 0.3)
@@ -184,3 +185,27 @@ def test_where_branches_overlap_too_much_rules_are_answered_all_the_same(
     assert "broken in more regions than can be listed" in out
     assert "proven   never wait when f0 <= 0.1 and f1 > 0.6" in out
     assert "What else is noticeable is not known: the branches of the tree overlap" in out
+
+
+def test_of_trees_whose_branches_overlap_too_much_known_differences_are_listed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def too_many_parts(*_: object) -> None:
+        raise TooManyPartsError
+
+    (tmp_path / "other").mkdir()
+    other = nodes.Selector((some.when(some.at_most("distance", 0.3), then=TURN), GO))
+    files = [tree_file(tmp_path, GO), "--against", tree_file(tmp_path / "other", other)]
+    unknown = "whether the trees do the same elsewhere is unknown"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(comparing, "_all_differing", too_many_parts)
+        check.main(files)
+        out = capsys.readouterr().out
+        # Of such small trees, all of them are known nevertheless.
+        assert "go instead of turn where distance ≤ 0.3" in out
+        assert unknown not in out
+        patched.setattr(comparing, "_MOST_SPLIT", 0)
+        check.main(files)
+    out = capsys.readouterr().out
+    assert unknown in out
+    assert "both do the same" not in out

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import rule_examples as written
 import strategies as some
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.runtime import executable
 from rebt_ros.logic.conditions import Difference, WeightedSum
+from rebt_ros.verification import comparing
 from rebt_ros.verification.comparing import compare
+from rebt_ros.verification.errors import TooManyPartsError
 from rebt_ros.verification.grid import Boxes, Grid
 
 _SAMPLE = 200
@@ -55,6 +58,42 @@ def test_a_state_is_in_a_difference_exactly_where_two_trees_differ(
             if _boxes_with(one.boxes, found.grid, states, row).any()
         }
         assert there == (set() if wanted[0] == wanted[1] else {wanted})
+
+
+@settings(max_examples=60, deadline=None)
+@given(some.rule_trees(), some.rule_trees(), st.integers(0, 60), st.lists(some.states, max_size=5))
+def test_where_branches_overlap_too_much_what_is_found_is_true_and_all_is_said_of_all_only(
+    mine: nodes.Node, other: nodes.Node, most: int, shown: list[tuple[float, ...]]
+) -> None:
+    pair = some.learned(mine), some.learned(other)
+    tables = [some.table(shown, [0] * len(shown))] if shown else []
+    everything = compare(*pair, tables)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(comparing, "_all_differing", _too_many_parts)
+        patched.setattr(comparing, "_MOST_SPLIT", most)
+        found = compare(*pair, tables)
+    for whole, part in zip(everything, found, strict=True):
+        known = {(one.mine, one.other): one for one in whole.divergences}
+        its = {(one.mine, one.other): one for one in part.divergences}
+        assert its.keys() <= known.keys()
+        assert {key: known[key].rows for key in its} == {key: one.rows for key, one in its.items()}
+        told = {key for key, one in known.items() if one.rows}
+        assert told <= its.keys()
+        if part.complete and part.exact and whole.exact:
+            assert its.keys() == known.keys()
+        for key, one in its.items():
+            within = known[key].boxes
+            # Each box shares cells of every field with what was found by looking at all.
+            for box in one.boxes.T:
+                shared = within & box[:, np.newaxis]
+                assert any(
+                    all(shared[field.words, place].any() for field in part.grid.fields)
+                    for place in range(within.shape[1])
+                )
+
+
+def _too_many_parts(*_: object) -> None:
+    raise TooManyPartsError
 
 
 def test_differences_that_no_numbers_have_are_left_out() -> None:
