@@ -1,13 +1,29 @@
-"""What a browser can ask for to change the draft, publish it and bring earlier trees back."""
+"""What a browser can ask for to change the draft."""
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from rebt_ros.errors import OptionError
+from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.options import PsaChoice
 from rebt_ros.studio import draft, learning_view
 from rebt_ros.studio.draft import Change
 from rebt_ros.studio.verbs import Answer, Arguments, Verbs
-from rebt_ros.studio.workbench import Publish, Workbench
+
+
+class Bench(Protocol):
+    """Has the draft."""
+
+    @property
+    def learning(self) -> Learning:
+        """The policy of the draft; raises `OptionError` where nothing was learned."""
+
+    def size_of(self, number: int) -> str:
+        """A pruning level in words."""
+
+    def change(self, what: str, change: Change) -> str:
+        """Changes the draft; returns what was done, in a sentence."""
 
 
 class Curating:
@@ -17,16 +33,13 @@ class Curating:
 
     Args:
         bench: Has the draft.
-        publish: Hands a document to who publishes it.
     """
 
-    def __init__(self, bench: Workbench, publish: Publish) -> None:
+    def __init__(self, bench: Bench) -> None:
         self._bench = bench
-        self._publish = publish
 
     def verbs(self) -> Verbs:
         """What can be asked for, by name."""
-        bench = self._bench
         return {
             "level": self._level,
             "attach": self._attach,
@@ -36,12 +49,6 @@ class Curating:
             "remove": self._remove,
             "move": self._move,
             "histogram": self._histogram,
-            "undo": lambda _: bench.undo(),
-            "redo": lambda _: bench.redo(),
-            "reset": lambda _: bench.reset(),
-            "rename": lambda asked: bench.rename(asked.text("name"), asked.text("shown")),
-            "publish": lambda asked: bench.publish(self._publish, asked.optional_text("note")),
-            "restore": lambda asked: bench.publish_version(self._publish, asked.text("version")),
         }
 
     def _level(self, asked: Arguments) -> str:

@@ -70,8 +70,7 @@ class StudioNode(Node):
         self._watch = RobotWatch(
             self, settings, self._board, self._timeline, self._workbench.take_published
         )
-        curating = Curating(self._workbench, self._proposals.publish)
-        self._verbs: Verbs = {**self._steering(), **self._teaching(), **curating.verbs()}
+        self._verbs: Verbs = {**self._steering(), **self._teaching(), **self._curating()}
         self._server = Server(self._board, self._ask, settings.host, settings.port)
         self._problem = ""
         self._ended = threading.Event()
@@ -191,6 +190,19 @@ class StudioNode(Node):
             "split": lambda asked: self._on_shelf(
                 lambda name: self._shelf.split(name, asked.number("at")), asked
             ),
+        }
+
+    def _curating(self) -> Verbs:
+        """The draft."""
+        bench, publish = self._workbench, self._proposals.publish
+        return {
+            **Curating(bench).verbs(),
+            "undo": lambda _: bench.undo(),
+            "redo": lambda _: bench.redo(),
+            "reset": lambda _: bench.reset(),
+            "rename": lambda asked: bench.rename(asked.text("name"), asked.text("shown")),
+            "publish": lambda asked: bench.publish(publish, asked.optional_text("note")),
+            "restore": lambda asked: bench.publish_version(publish, asked.text("version")),
         }
 
     def _act(self, asked: Arguments) -> str:
