@@ -213,7 +213,7 @@ class Journey:
         page.press("#recorder-buttons button", "Well done")
         page.section("learn")
         page.press("#learn", "Learn from 4 demonstrations")
-        page.sees("of 4 demonstrations", "#learn-draft-summary")
+        page.sees("of 4 demonstrations", "#learn-published-summary")
         self.kept("learned_again", "#learn-chart")
 
     def all_are_killed(self) -> None:
