@@ -14,7 +14,7 @@ from py_trees.common import Status
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.behavior_tree.runtime import TreeRuntime, executable
-from rebt_ros.export.blackboard import MISSING_TEXT, Variable, variables
+from rebt_ros.export.blackboard import Variable, variables
 from rebt_ros.export.btcpp import _Export
 
 #: How an action ends in one tick, by label.
@@ -97,7 +97,7 @@ class Engine:
 def _text(variable: Variable, value: float) -> str:
     """What a program writes to the variable of a feature that has categories."""
     if math.isnan(value):
-        return MISSING_TEXT
+        return ""
     category = variable.feature.categories[int(value)]
     # Categories that are not tested may hold any other text.
     return variable.categories.get(category, "none of them")

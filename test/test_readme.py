@@ -59,7 +59,7 @@ def test_the_policy_drives_an_environment_as_the_readme_says(tmp_path: Path) -> 
 def test_the_tree_in_the_readme_is_what_the_command_prints(tmp_path: Path) -> None:
     shown = _README.read_text(encoding="utf-8").split("```")[1].strip()
     command, _, excerpt = shown.partition("\n")
-    assert command.startswith("$ ros2 run rebt_ros learn scitos_g5_24.csv --no-header ")
+    assert command == "$ ros2 run rebt_ros learn scitos_g5_24.csv --no-header"
     program = (
         "from rebt_ros.commands import learn\n"
         f"learn.main([{str(_SCITOS)!r}, '--no-header', '--out', 'out'])"

@@ -19,8 +19,6 @@ from rebt_ros.logic.conditions import (
 
 #: A port of a tree cannot have the name of an attribute of every node.
 _RESERVED = ("ID", "name")
-#: What a variable of a category holds where the value is missing.
-MISSING_TEXT = ""
 
 
 @dataclass(frozen=True, slots=True)

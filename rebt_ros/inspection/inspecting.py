@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,8 @@ from rebt_ros.inspection.inspection import (
     Contradictions,
     Inspected,
     Inspection,
+    Outlier,
+    Timing,
 )
 from rebt_ros.inspection.joined import Joined, constant, joined
 from rebt_ros.inspection.timing import Clock, clock
@@ -65,34 +68,15 @@ def inspect(
     progress("looking for outliers", 0.4)
     far = outliers.outliers(rows, counts, timings)
     progress("looking for near-duplicates", 0.5)
-    names = tuple(one.name for one in demonstrations)
     seconds = [None if one is None else one.seconds for one in timings]
     near = duplicates.near_duplicates(rows, seconds)
+    names = tuple(one.name for one in demonstrations)
+    found = _Found(rows, names, clocks, timings, counts, against, far, near)
     inspected = []
     for number, one in enumerate(demonstrations):
         progress("looking at each", 0.7 + 0.3 * number / len(demonstrations))
-        part = rows.rows_of(number)
-        states = rows.table.states[part]
-        time = clocks[number]
-        still = None
-        if one.row_kind is RowKind.SAMPLE:
-            still = idle(rows.scaled(part), rows.table.chosen[part], time, idle_seconds)
-        inspected.append(
-            Inspected(
-                name=one.name,
-                path=paths[number] if paths else one.name,
-                rows=len(one),
-                timing=timings[number],
-                actions=_actions(rows, counts[number]),
-                gaps=time.gaps(),
-                idle=still,
-                constant=_named(rows, constant(states)),
-                missing=int(np.count_nonzero(np.isnan(states))),
-                near_duplicate=duplicates.as_duplicate(near.get(number), names),
-                contradicting=_contradictions(rows, number, against, clocks, names),
-                outliers=far[number],
-            )
-        )
+        path = paths[number] if paths else one.name
+        inspected.append(found.of(number, one, path, idle_seconds))
     progress("done", 1.0)
     return Inspection(
         rows.table.row_kind.value,
@@ -104,6 +88,44 @@ def inspect(
         tuple(inspected),
         (*_notes(rows), *alike(demonstrations)),
     )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Found:
+    """What was found by looking at all demonstrations together; sequences have an item for each."""
+
+    rows: Joined
+    names: tuple[str, ...]
+    clocks: Sequence[Clock]
+    timings: Sequence[Timing | None]
+    counts: IntArray
+    against: Contradicting
+    far: Sequence[tuple[Outlier, ...]]
+    near: Mapping[int, tuple[int, float]]
+
+    def of(self, number: int, one: Demonstration, path: str, idle_seconds: float) -> Inspected:
+        """What there is to say of a demonstration."""
+        part = self.rows.rows_of(number)
+        states = self.rows.table.states[part]
+        time = self.clocks[number]
+        still = None
+        if one.row_kind is RowKind.SAMPLE:
+            chosen = self.rows.table.chosen[part]
+            still = idle(self.rows.scaled(part), chosen, time, idle_seconds)
+        return Inspected(
+            name=one.name,
+            path=path,
+            rows=len(one),
+            timing=self.timings[number],
+            actions=_actions(self.rows, self.counts[number]),
+            gaps=time.gaps(),
+            idle=still,
+            constant=_named(self.rows, constant(states)),
+            missing=int(np.count_nonzero(np.isnan(states))),
+            near_duplicate=duplicates.as_duplicate(self.near.get(number), self.names),
+            contradicting=_contradictions(self.rows, number, self.against, self.clocks, self.names),
+            outliers=self.far[number],
+        )
 
 
 def _counts(rows: Joined) -> IntArray:

@@ -230,7 +230,7 @@ class RecordingSession:
         self._ended = None
         self._handed_back = ""
         self._begin(stamp)
-        return Answer(True, "recording: the demonstration's file is opened at its first action.")
+        return Answer(True, "recording: the demonstration begins with the first action.")
 
     def stop(self, stamp: int) -> Answer:
         """Ends the demonstration and records no more."""

@@ -23,7 +23,6 @@ from rebt_ros.studio.timeline import Moment, Timeline
 from rebt_ros.studio.tree_view import Json
 from rebt_ros.studio.verbs import Answer, Arguments
 from rebt_ros.verification.acting import Step, acting_leaves, commanding
-from rebt_ros.verification.describing import value_text
 from rebt_ros.verification.explaining import Explanation, explain
 from rebt_ros.verification.explanation_text import lines
 from rebt_ros.verification.support import Support, support_of
@@ -176,7 +175,7 @@ def _told(
     return {
         "lines": told,
         "values": {
-            feature.name: value_text(feature, value)
+            feature.name: _plain(feature, value)
             for feature, value in zip(learned.features, values, strict=True)
         },
         "acting": acting,
@@ -222,6 +221,13 @@ def _row(table: DemonstrationTable, name: str, seconds: float) -> int:
     raise OptionError(
         f"the tree was not learned from {name!r}: learn again, with this demonstration."
     )
+
+
+def _plain(feature: Feature, value: float) -> float | str | None:
+    """A value as the board has it, the reverse of `_coded`; None where it is missing."""
+    if not math.isfinite(value):
+        return None
+    return feature.categories[int(value)] if feature.kind is FeatureKind.CATEGORICAL else value
 
 
 def _coded(feature: Feature, values: Mapping[str, Any]) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import groupby
 from typing import Final
 
 import numpy as np
@@ -14,12 +16,12 @@ from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.wording import Wording, quantity_text, summary
+from rebt_ros.behavior_tree.wording import Wording, quantity_text
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.learning import evaluation
 from rebt_ros.learning.learning import Learning
 from rebt_ros.logic.conditions import Interval, Literal, Quantity, Threshold
-from rebt_ros.studio.tree_view import Json, suggestion_views, tree_view
+from rebt_ros.studio.tree_view import Json, suggestion_views, summary, tree_view
 from rebt_ros.trial.tally import Tally
 from rebt_ros.verification.contradictions import agreeing_demands
 from rebt_ros.verification.proof import check
@@ -140,12 +142,15 @@ def changed_rows(learning: Learning, published: LearnedTree | None) -> dict[str,
 
 
 def differences_in_words(published: LearnedTree | None, draft: LearnedTree) -> Iterator[str]:
-    """Which branches come and go, each in a sentence."""
+    """Which branches come and go, each in a sentence.
+
+    A branch is still there where conditions that stand side by side are in another order.
+    """
     if published is None:
         return
     before, after = _branches(published), _branches(draft)
-    yield from (f"no longer: {branch}" for branch in before if branch not in after)
-    yield from (f"new: {branch}" for branch in after if branch not in before)
+    yield from (f"no longer: {words}" for branch, words in before.items() if branch not in after)
+    yield from (f"new: {words}" for branch, words in after.items() if branch not in before)
     kept = [branch for branch in before if branch in after]
     if kept != [branch for branch in after if branch in before]:
         yield "branches stand in another order"
@@ -235,10 +240,29 @@ def _compared(learning: Learning, path: str) -> Quantity:
             raise OptionError(f"the node at {path} compares no number.")
 
 
-def _branches(learned: LearnedTree) -> tuple[str, ...]:
+def _branches(learned: LearnedTree) -> dict[nodes.Node, str]:
+    """The branches below the root, with their conditions in one order, and each in words."""
     wording = Wording(learned)
     roots = nodes.children(learned.tree) or (learned.tree,)
-    return tuple(_branch_in_words(branch, wording) for branch in roots)
+    return {_in_order(branch): _branch_in_words(branch, wording) for branch in roots}
+
+
+def _in_order(node: nodes.Node) -> nodes.Node:
+    """A branch whose neighboring conditions stand in one order: theirs changes nothing."""
+    match node:
+        case nodes.Sequence() | nodes.Selector():
+            ordered: list[nodes.Node] = []
+            children = map(_in_order, nodes.children(node))
+            for tests, group in groupby(children, key=_only_tests):
+                stretch = list(group)
+                ordered += sorted(stretch, key=repr) if tests else stretch
+            return replace(node, children=tuple(ordered))
+        case _:
+            return node
+
+
+def _only_tests(node: nodes.Node) -> bool:
+    return not nodes.actions(node)
 
 
 def _branch_in_words(branch: nodes.Node, wording: Wording) -> str:

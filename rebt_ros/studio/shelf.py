@@ -33,10 +33,10 @@ LEFT_OUT: Final = ".left-out"
 #: Follows the name of one that goes soon.
 DELETED: Final = ".deleted"
 
-#: How long a deleted demonstration can be had back (seconds).
+#: How long a deleted demonstration can be restored (seconds).
 UNDO_TIME: Final = 600.0
 
-_BACK: Final = f"for {UNDO_TIME / 60:.0f} minutes the whole one can be had back."
+_BACK: Final = f"for {UNDO_TIME / 60:.0f} minutes the whole one can be restored."
 
 #: Points of a thumbnail's line, and features that have one.
 _POINTS: Final = 60
@@ -94,17 +94,17 @@ class Shelf:
         if suffix not in {LEFT_OUT, ASIDE}:
             raise OptionError(f"{name} is not left out.")
         self._rename(name, suffix, "")
-        return f"{name} is taken in: the next tree is learned from it, too."
+        return f"{name} is taken in again: the next tree is learned from it, too."
 
     def delete(self, name: str) -> str:
-        """Deletes a demonstration, which can be had back for a while.
+        """Deletes a demonstration, which can be restored for a while.
 
         Raises:
             OptionError: There is none of this name.
             StorageError: Its file cannot be renamed.
         """
         self._rename(name, self._suffix_of(name), DELETED)
-        return f"{name} is deleted; for {UNDO_TIME / 60:.0f} minutes it can be had back."
+        return f"{name} is deleted; for {UNDO_TIME / 60:.0f} minutes it can be restored."
 
     def restore(self, name: str) -> str:
         """Takes a deletion back, or the cuts that made parts of a demonstration.
@@ -152,7 +152,7 @@ class Shelf:
         return f"{name} is split at {at:.1f} s; {_BACK}"
 
     def tidy(self) -> None:
-        """Destroys what was deleted too long ago to be had back.
+        """Destroys what was deleted too long ago to be restored.
 
         Raises:
             StorageError: A file cannot be removed.

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any, Final, TypeAlias
 
 from rebt_ros.behavior_tree import nodes, paths
-from rebt_ros.behavior_tree.learned_tree import LearnedTree
+from rebt_ros.behavior_tree.learned_tree import LearnedTree, SuggestionKind
 from rebt_ros.behavior_tree.shown import Span
-from rebt_ros.behavior_tree.wording import Kind, Wording, heading, quantity_text, summary
+from rebt_ros.behavior_tree.wording import Kind, Wording, how_often, quantity_text
 from rebt_ros.drawing.shapes import Line, Node
 from rebt_ros.drawing.tree_picture import drawn_tree
 from rebt_ros.logic.conditions import (
@@ -29,6 +29,14 @@ Json: TypeAlias = Any
 _UNKNOWN: Final = Span(math.nan, math.nan)
 
 _PILLS: Final = frozenset({Kind.CONDITION, Kind.INVERTER})
+
+_SUGGESTED: Final = {
+    SuggestionKind.PSA: "Parallel or Selector",
+    SuggestionKind.LAT_SEQUENCE: "Sequence",
+    SuggestionKind.LAT_REPEATER: "Loop",
+    SuggestionKind.SEQUENCE: "Sequence",
+    SuggestionKind.REPEATER: "Loop",
+}
 
 
 def tree_view(learned: LearnedTree, tree: nodes.Node | None = None) -> dict[str, Json]:
@@ -63,7 +71,7 @@ def suggestion_views(learned: LearnedTree) -> list[dict[str, Json]]:
     return [
         {
             "id": suggestion.id,
-            "heading": heading(suggestion),
+            "heading": f"{_SUGGESTED[suggestion.kind]}, shown {how_often(suggestion)}",
             "kind": suggestion.kind.value,
             "support": suggestion.support,
             "attached": suggestion.attached,
@@ -71,6 +79,24 @@ def suggestion_views(learned: LearnedTree) -> list[dict[str, Json]]:
         }
         for suggestion in learned.suggestions
     ]
+
+
+def summary(learned: LearnedTree) -> str:
+    """A line about the tree: its size, and what it was learned from.
+
+    How well it does is not told: a person may have changed it since.
+    """
+    origin = learned.provenance
+    parts = (
+        _count(nodes.size(learned.tree), "node"),
+        f"learned from {_count(origin.rows, 'row')}"
+        f" of {_count(origin.demonstrations, 'demonstration')}",
+    )
+    return " · ".join(parts)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def published_view(learned: LearnedTree, document: str) -> dict[str, Json]:

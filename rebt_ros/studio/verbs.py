@@ -68,6 +68,10 @@ class Arguments:
         return int(number)
 
 
+#: What can be asked for, by name.
+Verbs: TypeAlias = Mapping[str, Callable[[Arguments], Answer]]
+
+
 @dataclass(frozen=True, slots=True)
 class Reply:
     """What the browser that asked is told."""
@@ -83,7 +87,7 @@ class Reply:
         return {"answer": self.id, "ok": self.ok, "message": self.message, "data": self.data}
 
 
-def reply(verbs: Mapping[str, Callable[[Arguments], Answer]], request: Any) -> Reply:
+def reply(verbs: Verbs, request: Any) -> Reply:
     """Does what a browser asks for.
 
     Args:

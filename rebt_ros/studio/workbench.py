@@ -27,8 +27,8 @@ from rebt_ros.trial.driven import read_driven
 from rebt_ros.trial.tally import Tally
 from rebt_ros.verification.rules import RuleSet
 
-#: Hands a document to who publishes it; returns what that says, and the number of the version.
-Publish = Callable[[str], tuple[str, str]]
+#: Hands a document to who publishes it; returns the number of the version.
+Publish = Callable[[str], str]
 
 _JOURNAL: Final = "journal.json"
 _NAMES: Final = "names.json"
@@ -136,7 +136,7 @@ class Workbench:
             draft = self._there()
             what = draft.undoes
             self._work_on(draft.undone())
-        return f"taken back: {what}."
+        return f"undone: {what}."
 
     def redo(self) -> str:
         """Makes the change again that was taken back last.
@@ -148,7 +148,7 @@ class Workbench:
             draft = self._there()
             what = draft.redoes
             self._work_on(draft.redone())
-        return f"done again: {what}."
+        return f"redone: {what}."
 
     def reset(self) -> str:
         """Goes back to what was learned.
@@ -170,6 +170,13 @@ class Workbench:
         with self._lock:
             return self._there().learning
 
+    def size_of(self, number: int) -> str:
+        """A pruning level as people see it: its size in words; its number where it is not shown."""
+        leaves = next((one["leaves"] for one in self._levels if one["number"] == number), None)
+        if leaves is None:
+            return f"level {number}"
+        return f"the tree with {leaves} {'leaf' if leaves == 1 else 'leaves'}"
+
     def publish(self, publish: Publish, note: str) -> str:
         """Has the draft published.
 
@@ -184,9 +191,9 @@ class Workbench:
             draft = self._there()
             changes = [step.what for step in draft.steps[1 : draft.place + 1]]
             document = dumps(draft.learning.learned)
-        message, version = publish(document)
+        version = publish(document)
         self._enter(version, note or "; ".join(changes) or "as learned")
-        return message
+        return f"the robot has the draft now, as version {_number(version)}."
 
     def publish_version(self, publish: Publish, version: str) -> str:
         """Has a tree published again that was published before.
@@ -197,9 +204,9 @@ class Workbench:
         if not version.isdecimal() or not version.isascii():
             raise OptionError(f"there is no version {version!r}.")
         document = read_text(self._output / "trees" / f"{version}.json")
-        message, number = publish(document)
+        number = publish(document)
         self._enter(number, f"version {int(version)} again")
-        return message
+        return f"the robot has version {int(version)} again, as version {_number(number)}."
 
     def rename(self, name: str, shown: str) -> str:
         """Gives an action or a feature another name on the page; nothing else changes.
@@ -324,6 +331,10 @@ def _version_view(path: Path, entry: Any, current: str) -> dict[str, Json]:
         "nodes": size,
         "current": text == current,
     }
+
+
+def _number(version: str) -> str:
+    return str(int(version)) if version.isdecimal() else version
 
 
 def _modified(path: Path) -> int:

@@ -430,6 +430,18 @@ def test_an_outcome_of_another_type_is_refused(domain: int, peer: Peer, tmp_path
     assert "/outcome carries std_msgs/msg/Float64" in running.err
 
 
+def test_a_tree_that_gets_no_state_has_not_failed(domain: int, peer: Peer, tmp_path: Path) -> None:
+    World(peer)
+    reading = replace(GOOD, features=tuple(replace(one, topic="silent") for one in GOOD.features))
+    (tree,) = _write(tmp_path, good=reading)
+    with (
+        executor(domain, tmp_path, peer),
+        trial(domain, tmp_path, tree, "--outcome-topic", "outcome") as running,
+    ):
+        running.ends(peer, 1)
+    assert "the executor does not drive: waiting for state: silent (never received)" in running.err
+
+
 def test_an_outcome_that_says_nothing_ends_the_trial(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:

@@ -290,7 +290,17 @@ def test_a_person_teaches_learns_edits_publishes_and_the_robot_does_it(
         events = client.board["timeline"].values()
         assert any(event["kind"] == "person" and event["text"] == "stop" for event in events)
 
-        # What was published before can be had back.
+        # The strip must not show that the person is at it until the tree drives.
+        for _ in range(3):
+            client.does("act", label="stop")
+        client.wait(
+            lambda: any(
+                event["kind"] == "person" and event["text"] == "nothing"
+                for event in client.board["timeline"].values()
+            )
+        )
+
+        # What was published before can be restored.
         first = min(client.board["versions"])
         client.does("restore", version=first)
         client.wait(lambda: client.board["tree"]["document"] == before)

@@ -370,7 +370,7 @@ def explanation() -> dict[str, Any]:
             "    charge: does not hold: docked (no)",
         ],
         "statuses": None,
-        "values": {name: f"{value:g}" for name, value in values_at(QUIET).items()},
+        "values": values_at(QUIET),
         "acting": "1.1",
         "from": [{"demonstration": NAMES[0], "rows": 68, "seconds": 3.4}],
         "least": ["target_bearing 1.24 → 0.25 → go", "docked no → yes → charge"],

@@ -152,6 +152,27 @@ def test_what_changes_is_counted_in_rows_and_told_in_words() -> None:
     assert any(sentence.startswith("new: ") for sentence in words)
 
 
+def test_conditions_in_another_order_are_no_change() -> None:
+    before = learned().learned
+
+    def turned(node: nodes.Node) -> nodes.Node:
+        children = nodes.children(node)
+        if not isinstance(node, nodes.Sequence | nodes.Selector):
+            return node
+        if nodes.actions(node):
+            tests = [child for child in children if not nodes.actions(child)]
+            rest = [child for child in children if nodes.actions(child)]
+            if list(children) == tests + rest:
+                children = (*reversed(tests), *rest)
+        else:
+            children = children[::-1]
+        return replace(node, children=tuple(map(turned, children)))
+
+    after = replace(before, tree=turned(before.tree))
+    assert after.tree != before.tree
+    assert list(differences_in_words(before, after)) == []
+
+
 def test_rules_are_proven_or_broken_before_anything_is_published() -> None:
     text = "rules:\n- never: go\n  when: x < 0.2\n- never: go\n"
     view = draft_view(learned(), None, rules(text, "rules.yaml"))

@@ -11,10 +11,10 @@ from test_draft import learned
 
 from rebt_ros.behavior_tree import nodes, paths
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.demonstration.schema import Feature
+from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.errors import OptionError
 from rebt_ros.studio.explaining import Explaining
-from rebt_ros.studio.timeline import Timeline
+from rebt_ros.studio.timeline import Moment, Timeline
 from rebt_ros.studio.verbs import Arguments
 from rebt_ros.verification.acting import acting_leaves
 
@@ -78,3 +78,27 @@ def test_what_is_not_known_of_a_branch_is_said() -> None:
     nobody = Explaining(learned, lambda: None, Timeline())
     with pytest.raises(OptionError, match="no tree is published"):
         nobody.branch(Arguments({"path": "root", "robot": True}))
+
+
+def test_values_of_a_moment_are_what_the_tree_read() -> None:
+    explaining = Explaining(learned, lambda: None, Timeline())
+    _, told = explaining.explain(Arguments({"demonstration": "one", "seconds": 2.0}))
+    table = learned().table
+    names = [feature.name for feature in table.features]
+    assert told["values"] == dict(zip(names, table.states[20].tolist(), strict=True))
+
+
+def test_values_of_a_moment_are_as_the_board_has_them() -> None:
+    features = (
+        Feature("speed"),
+        Feature("gripper", FeatureKind.CATEGORICAL, ("open", "closed")),
+        Feature("docked", FeatureKind.BINARY),
+    )
+    go = nodes.Action("go", "action")
+    provenance = learned().learned.provenance
+    tree = LearnedTree(features, (go,), go, provenance)
+    timeline = Timeline()
+    values: dict[str, float | str | None] = {"speed": None, "gripper": "closed", "docked": 1.0}
+    timeline.note(Moment(1.0, "", ("RUNNING",), values, {"action": "go"}))
+    _, told = Explaining(learned, lambda: tree, timeline).explain(Arguments({"t": 2.0}))
+    assert told["values"] == values

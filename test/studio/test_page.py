@@ -47,6 +47,11 @@ SECTIONS = ("live", "teach", "learn", "curate", "explain")
 MARKUP = "<img src=x onerror=\"document.title='taken'\"><script>1</script>&amp;"
 
 
+def number_text(value: float) -> str:
+    """A number as the page shows it."""
+    return f"{value:.3g}"
+
+
 @pytest.fixture
 def page(chromium: Browser, studio: Pretend) -> Browser:
     """The page of a studio that has seen some minutes of work."""
@@ -296,12 +301,48 @@ def test_words_stand_out_from_what_is_behind_them(seen: Browser, dark: bool) -> 
         assert seen.run(_FAINT) == []
 
 
-def test_it_fits_a_tablet_held_upright(seen: Browser) -> None:
-    seen.look(width=800, height=1280)
+@pytest.mark.parametrize(
+    ("width", "height"), [(800, 1280), (390, 844), (320, 640)], ids=["tablet", "phone", "zoomed"]
+)
+def test_it_fits_a_narrow_window(seen: Browser, width: int, height: int) -> None:
+    seen.look(width=width, height=height)
     for section in SECTIONS:
         seen.section(section)
+        seen.drawn()
         wide = seen.run("return document.documentElement.scrollWidth - innerWidth")
         assert wide <= 0, section
+        # Nor is anything cut off at the edge of what holds it; trees scroll.
+        assert seen.run(_CUT_OFF) == [], section
+
+
+def test_a_demonstration_is_called_the_same_everywhere(
+    page: Browser, studio: Pretend, asked: Any
+) -> None:
+    """By when it began, on the clock of who looks."""
+    page.command("Emulation.setTimezoneOverride", timezoneId="America/New_York")
+    try:
+        page.open(studio.url)
+        page.section("teach")
+        name = NAMES[0]
+        title = page.text(f'#demonstrations [data-key="{name}"] h3')
+        page.section("explain")
+        page.sees(title, f'#explain-which [data-key="{name}"]')
+        page.section("curate")
+        page.sees(title, "#changed-demonstrations")
+        page.press_node("#curate-tree", "0.1")
+        page.sees(title, "#editor-body .from")
+        studio.answers["delete"] = lambda given: (f"{given['name']} is deleted.", None)
+        page.section("teach")
+        page.press(f'#demonstrations [data-key="{name}"] button', "Delete")
+        page.sees(f"{title} is deleted.", "#toasts")
+        # Of a robot with a simulated clock, the file's name says when it was recorded.
+        board = studio.board
+        board.replace(Section.DEMONSTRATIONS, {name: demonstration(12.5)})
+        page.until(
+            lambda: page.text(f'#demonstrations [data-key="{name}"] h3').endswith("04:15:02")
+        )
+    finally:
+        page.command("Emulation.setTimezoneOverride", timezoneId="")
 
 
 def test_nothing_is_loaded_from_elsewhere(seen: Browser, worked_in: Pretend) -> None:
@@ -315,9 +356,7 @@ def test_nothing_is_loaded_from_elsewhere(seen: Browser, worked_in: Pretend) -> 
 
 def test_two_trees_stand_side_by_side(seen: Browser) -> None:
     seen.section("learn")
-    seen.sees(
-        "does something else than the robot's tree in 31 of 1,677 rows (2 %)", "#learn-changed"
-    )
+    seen.sees("acts differently from the robot's tree in 31 of 1,677 rows (2%)", "#learn-changed")
     seen.sees("New: docked → battery ≤ 0.95 → charge.", "#learn-words")
     size = len(list(nodes.walk(small_tree().tree)))
     for tree in ("#learn-published", "#learn-draft"):
@@ -627,14 +666,14 @@ def test_learning_shows_how_far_it_is_and_can_be_cancelled(
     asked("learn")
     learner = node("learning", **{"stage": "cross-validating", "progress (%)": "40"})
     studio.board.update(Section.NODES, {"learner": learner})
-    page.sees("Cross-validating. 40 %", "#learn-stage")
+    page.sees("Cross-validating. 40%", "#learn-stage")
     assert page.run("return document.getElementById('learn-bar').value") == 40
     page.press("#learn-cancel")
     asked("cancel")
     studio.board.update(Section.NODES, {"learner": node("idle", stage="idle")})
     page.until(lambda: not page.one("#learn-progress").is_displayed())
     studio.board.update(Section.LEARNING, {"awaited": True})
-    page.sees("Its sizes are on their way", "#learn-stage")
+    page.sees("its sizes are being prepared", "#learn-stage")
     studio.board.update(Section.LEARNING, {"awaited": None})
     page.until(lambda: not page.one("#learn-progress").is_displayed())
 
@@ -646,7 +685,7 @@ def test_a_size_is_chosen_on_the_chart_and_in_the_list(page: Browser, asked: Any
     # Agreement, recall, driving trials, and the one in the draft.
     page.until(lambda: len(page.all("#learn-chart .scatterlayer .trace")) == 4)
     page.until(lambda: len(page.all("#learn-chart .errorbar")) == 2)
-    page.sees("drove 18 of 20 episodes well", '#learn-levels [data-key="0"]')
+    page.sees("succeeded in 18 of 20 episodes", '#learn-levels [data-key="0"]')
     page.press_at("#learn-chart .scatterlayer .trace:first-child .point:nth-child(2)", 0.5)
     assert asked("level") == {"number": 2}
     page.press('#learn-levels [data-key="1"]')
@@ -810,6 +849,10 @@ def test_a_moment_of_a_demonstration_is_explained(page: Browser, asked: Any) -> 
     page.until(lambda: asked("explain", 2)["seconds"] == pytest.approx(12))
     page.sees("turn_left", "#explain-why .first")
     page.sees("target_bearing 1.24 → 0.25 → go", "#explain-why")
+    page.until(lambda: page.text('#explain-values [data-key="docked"]') == "dockedno")
+    battery = number_text(values_at(QUIET)["battery"])
+    page.until(lambda: page.text('#explain-values [data-key="battery"]') == f"battery{battery}")
+    page.until(lambda: battery in page.text('#explain-tree [data-path="0.1"] .meter'))
     page.until(lambda: page.all('#explain-tree [data-path="1.1"].active'))
     page.press_at("#explain-picture .cut", 0.25)
     page.until(lambda: asked("explain", 3)["seconds"] == pytest.approx(6, abs=0.5))
@@ -885,6 +928,12 @@ _CHOOSE = """const one = document.querySelector(arguments[0]);
     one.dispatchEvent(new Event('change', {bubbles: true}));"""
 
 #: Words with a contrast below 4.5 to the colour behind them (WCAG 2 AA), or 3 where they are large.
+_CUT_OFF = """const bounds = (one) => one.getBoundingClientRect();
+    return [...document.querySelectorAll('main .card *')]
+      .filter(one => one.checkVisibility() && !one.closest('svg, .tree-host, .plotly, .chart'))
+      .filter(one => bounds(one).right > bounds(one.closest('.card')).right + 1)
+      .map(one => one.outerHTML.slice(0, 200))"""
+
 _FAINT = """
     const channel = (value) => {
       const share = value / 255;

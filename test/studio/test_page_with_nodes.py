@@ -153,9 +153,9 @@ class Journey:
         page.press("#learn", "Learn from 3 demonstrations")
         page.sees("Learned a behavior tree", "#toasts")
         page.until(lambda: len(page.all("#learn-levels label")) > 1)
-        page.sees("The robot follows this very tree.", "#learn-changed")
+        page.sees("The robot follows this tree.", "#learn-changed")
         page.press("#learn-levels label:not(:has(:checked))")
-        page.sees("does something else than the robot's tree", "#learn-changed")
+        page.sees("acts differently from the robot's tree", "#learn-changed")
         page.until(lambda: page.all("#learn-chart .point"))
         self.kept("another_size", "#learn-chart")
 
@@ -163,7 +163,7 @@ class Journey:
         """The larger tree again, with a suggestion, a choice and another threshold."""
         page = self.page
         page.section("curate")
-        page.press("#undo", "Undo: choosing level")
+        page.press("#undo", "Undo: choosing the tree with")
         page.sees("The robot follows this draft.", "#curate-state")
         page.press('#suggestions [data-key="psa-1"] button', "Put it into the draft")
         page.until(lambda: page.all("#curate-tree .kind-psa"))
@@ -176,7 +176,7 @@ class Journey:
         self._drag(-0.2)
         self.kept("threshold", "#editor")
         page.press("#editor-body button", "Change it to")
-        page.sees("does something else than the robot's tree", "#changed")
+        page.sees("acts differently from the robot's tree", "#changed")
 
     def publish(self) -> None:
         """The executor gets the draft, and runs it."""
@@ -213,7 +213,7 @@ class Journey:
         page.press("#recorder-buttons button", "Well done")
         page.section("learn")
         page.press("#learn", "Learn from 4 demonstrations")
-        page.sees("of 4 demonstrations", "#learn-draft-summary")
+        page.sees("of 4 demonstrations", "#learn-published-summary")
         self.kept("learned_again", "#learn-chart")
 
     def all_are_killed(self) -> None:

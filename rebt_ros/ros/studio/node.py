@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import getpass
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
@@ -13,7 +13,6 @@ from std_msgs.msg import String
 
 from rebt_ros.demonstration.builder import is_label
 from rebt_ros.errors import OptionError, RebtError
-from rebt_ros.learning.options import PsaChoice
 from rebt_ros.live.recording_session import NO_ROWS, NOT_HEARD
 from rebt_ros.offline.rules_files import rules_for
 from rebt_ros.ros import lifetime
@@ -23,18 +22,16 @@ from rebt_ros.ros.studio.publishing import Proposals
 from rebt_ros.ros.studio.robot_watch import RobotWatch
 from rebt_ros.ros.studio.server import Server
 from rebt_ros.ros.studio.settings import declare_settings
-from rebt_ros.studio import draft, learning_view
 from rebt_ros.studio.board import Board, Section
+from rebt_ros.studio.curating import Curating
 from rebt_ros.studio.explaining import Explaining
 from rebt_ros.studio.shelf import Shelf
 from rebt_ros.studio.timeline import Timeline
-from rebt_ros.studio.verbs import Answer, Arguments, Reply, reply
+from rebt_ros.studio.verbs import Arguments, Reply, Verbs, reply
 from rebt_ros.studio.workbench import Workbench
 
 #: Between two looks at files (seconds).
 _LOOK: Final = 1.0
-
-_Verbs = Mapping[str, Callable[[Arguments], Answer]]
 
 
 class StudioNode(Node):
@@ -73,7 +70,7 @@ class StudioNode(Node):
         self._watch = RobotWatch(
             self, settings, self._board, self._timeline, self._workbench.take_published
         )
-        self._verbs: _Verbs = {**self._steering(), **self._teaching(), **self._curating()}
+        self._verbs: Verbs = {**self._steering(), **self._teaching(), **self._curating()}
         self._server = Server(self._board, self._ask, settings.host, settings.port)
         self._problem = ""
         self._ended = threading.Event()
@@ -139,11 +136,11 @@ class StudioNode(Node):
 
     # --- what browsers ask for ---
 
-    def _steering(self) -> _Verbs:
+    def _steering(self) -> Verbs:
         """The robot, and what it does."""
         calls, settings = self._calls, self._settings
         return {
-            "enable": lambda asked: calls.switch(f"{settings.executor}/enable", asked.flag("on")),
+            "enable": self._enable,
             "act": self._act,
             "learn": lambda _: self._workbench.learn(
                 lambda: calls.trigger(f"{settings.learner}/relearn", works=self._is_learning)
@@ -156,12 +153,20 @@ class StudioNode(Node):
             "branch": self._explaining.branch,
         }
 
+    def _enable(self, asked: Arguments) -> str:
+        on = asked.flag("on")
+        answer = self._calls.switch(f"{self._settings.executor}/enable", on)
+        if not on:
+            return "the tree has stopped."
+        condition = answer.removeprefix("enabled: ")
+        return "the tree drives the robot." if condition == "running." else answer
+
     def _is_learning(self) -> bool:
         learner = self._board.section(Section.NODES).get("learner", {})
         stage: str = learner.get("values", {}).get("stage", "idle")
         return stage != "idle"
 
-    def _teaching(self) -> _Verbs:
+    def _teaching(self) -> Verbs:
         """Demonstrations."""
         calls, recorder = self._calls, self._settings.recorder
         return {
@@ -187,71 +192,17 @@ class StudioNode(Node):
             ),
         }
 
-    def _curating(self) -> _Verbs:
+    def _curating(self) -> Verbs:
         """The draft."""
-        bench = self._workbench
-
-        def named(verb: str, path: str) -> str:
-            return f"{verb} {draft.words_at(bench.learning, path)}"
-
-        def threshold(asked: Arguments) -> str:
-            path, value = asked.text("path"), asked.number("value")
-            end = asked.optional_text("end") or "at_most"
-            if end not in {"above", "at_most"}:
-                raise OptionError("'end' must be 'above' or 'at_most'.")
-            change = draft.with_threshold(path, value, upper=end == "at_most")
-            return bench.change(f"{named('changing', path)} to {value:.6g}", change)
-
-        def psa(asked: Arguments) -> str:
-            path, choice = asked.text("path"), asked.text("choice")
-            if choice not in {one.value for one in PsaChoice}:
-                raise OptionError("'choice' must be 'parallel' or 'selector'.")
-            change = draft.resolved(path, PsaChoice(choice))
-            return bench.change(f"{named('making', path)} a {choice}", change)
-
-        def level(asked: Arguments) -> str:
-            number = asked.whole("number")
-            return bench.change(f"choosing level {number}", draft.chosen_level(number))
-
-        def attach(asked: Arguments) -> str:
-            name = asked.text("suggestion")
-            return bench.change(f"attaching {name}", draft.attached(name))
-
-        def detach(asked: Arguments) -> str:
-            name = asked.text("suggestion")
-            return bench.change(f"detaching {name}", draft.detached(name))
-
-        def remove(asked: Arguments) -> str:
-            path = asked.text("path")
-            return bench.change(named("removing", path), draft.removed(path))
-
-        def move(asked: Arguments) -> str:
-            path, by = asked.text("path"), asked.whole("by")
-            return bench.change(named("moving", path), draft.moved(path, by))
-
-        def histogram(asked: Arguments) -> Answer:
-            path = asked.text("path")
-            return path, learning_view.histogram(bench.learning, path)
-
+        bench, publish = self._workbench, self._proposals.publish
         return {
-            "level": level,
-            "attach": attach,
-            "detach": detach,
-            "psa": psa,
-            "threshold": threshold,
-            "remove": remove,
-            "move": move,
-            "histogram": histogram,
+            **Curating(bench).verbs(),
             "undo": lambda _: bench.undo(),
             "redo": lambda _: bench.redo(),
             "reset": lambda _: bench.reset(),
             "rename": lambda asked: bench.rename(asked.text("name"), asked.text("shown")),
-            "publish": lambda asked: bench.publish(
-                self._proposals.publish, asked.optional_text("note")
-            ),
-            "restore": lambda asked: bench.publish_version(
-                self._proposals.publish, asked.text("version")
-            ),
+            "publish": lambda asked: bench.publish(publish, asked.optional_text("note")),
+            "restore": lambda asked: bench.publish_version(publish, asked.text("version")),
         }
 
     def _act(self, asked: Arguments) -> str:

@@ -39,14 +39,14 @@ class Proposals:
         self._ended = False
         node.create_subscription(String, f"{learner}/proposal_answer", self._on_answer, 10)
 
-    def publish(self, document: str) -> tuple[str, str]:
+    def publish(self, document: str) -> str:
         """Has a tree published.
 
         Args:
             document: The tree.
 
         Returns:
-            What the learner says, and the number of the version.
+            The number of the version.
 
         Raises:
             PublishingError: It refuses, or does not answer.
@@ -76,7 +76,7 @@ class Proposals:
             answer = self._answers.pop(name)
         if not answer["published"]:
             raise PublishingError(str(answer["message"]))
-        return str(answer["message"]), str(answer["version"])
+        return str(answer["version"])
 
     def close(self) -> None:
         """Ends all waiting."""

@@ -42,6 +42,8 @@ _PERIOD: Final = 0.1
 _LOOK_PERIOD: Final = 0.5
 #: A node that says nothing for so long is gone (seconds).
 _SILENCE: Final = 4.0
+#: A person's action that was said again and again has ended after so much silence (seconds).
+_HELD: Final = 1.0
 
 _LEVELS: Final = {
     DiagnosticStatus.OK: "OK",
@@ -78,6 +80,8 @@ class RobotWatch:
         self._values: dict[str, float | str | None] = {}
         self._commands: dict[str, str] = {}
         self._persons: dict[str, str] = {}
+        self._said: dict[str, float] = {}
+        self._said_again: set[str] = set()
         self._statuses: tuple[str, ...] = ()
         self._document = ""
         self._heard: dict[str, float] = {}
@@ -172,6 +176,12 @@ class RobotWatch:
 
     def _on_person(self, channel: str, message: String) -> None:
         self.know_actions({message.data: channel} if message.data else {})
+        now = time.monotonic()
+        if self._persons.get(channel) == message.data and now - self._said[channel] <= _HELD:
+            self._said_again.add(channel)
+        else:
+            self._said_again.discard(channel)
+        self._said[channel] = now
         if self._persons.get(channel) != message.data:
             self._persons[channel] = message.data
             self._event(EventKind.PERSON, message.data or "nothing", channel)
@@ -250,12 +260,26 @@ class RobotWatch:
                 self._board.replace(Section.VALUES, shown)
                 self._note()
         now = time.monotonic()
+        self._end_persons_actions(now)
         for role in self._names.values():
             if role in self._heard and now - self._heard[role] > _SILENCE:
                 del self._heard[role]
                 self._board.update(Section.NODES, {role: _absent(role)})
                 if role == "executor":
                     self._forget_run()
+
+    def _end_persons_actions(self, now: float) -> None:
+        """Notes who has let go.
+
+        Who says an action only when it is another one may still be at it, as is a person for whom
+        the executor waits.
+        """
+        if str(self._board.section(Section.RUN).get("condition", "")).startswith("paused"):
+            return
+        for channel, label in self._persons.items():
+            if label and channel in self._said_again and now - self._said[channel] > _HELD:
+                self._persons[channel] = ""
+                self._event(EventKind.PERSON, "nothing", channel)
 
     def _forget_run(self) -> None:
         """The executor has ended: nothing is commanded, and the one that follows begins anew."""

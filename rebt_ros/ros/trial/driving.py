@@ -138,7 +138,7 @@ class Driving:
     def _watch(self, began: float) -> tuple[bool, Ending]:
         """Waits for the end of an episode."""
         limit = self._settings.time_limit
-        enabled = looked = time.monotonic()
+        enabled = looked = ticked = time.monotonic()
         has_driven = False
         while True:
             success = self._judge.success()
@@ -152,7 +152,10 @@ class Driving:
             if limit is not None and self._peer.seconds - began >= limit:
                 return False, Ending.TIME_LIMIT
             now = time.monotonic()
-            if not has_driven and now - enabled > PATIENCE:
+            if not self._executor.waits:
+                ticked = now
+            # A tree that gets no state has not failed: nobody has let it try.
+            if (not has_driven and now - enabled > PATIENCE) or now - ticked > PATIENCE:
                 raise TrialError(f"the executor does not drive: {self._executor.condition}.")
             if now - looked > _LOOK:
                 looked = now

@@ -97,6 +97,11 @@ class ExecutorHandle:
         """What it said last that it does or waits for."""
         return self._message
 
+    @property
+    def waits(self) -> bool:
+        """Whether it said last that it waits for something, such as the state."""
+        return self._message.startswith("waiting for ")
+
     def give(self, candidate: Candidate) -> None:
         """Gives it a tree, and waits until it is that which runs.
 

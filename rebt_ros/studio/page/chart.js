@@ -124,5 +124,5 @@ function success(levels, shade) {
 
 /** What a driving trial has found of a tree. */
 export function driveWords(drove) {
-  return `drove ${drove.successes} of ${count(drove.episodes, "episode")} well`;
+  return `succeeded in ${drove.successes} of ${count(drove.episodes, "episode")}`;
 }

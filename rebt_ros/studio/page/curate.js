@@ -5,7 +5,7 @@ import { Editor } from "./editor.js";
 import { changedWords } from "./learn.js";
 import { features } from "./margins.js";
 import { Tree, treeTools } from "./tree.js";
-import { clock, count, sentence, shortName } from "./words.js";
+import { clock, count, sentence } from "./words.js";
 
 const RULE_WORDS = { true: "kept", false: "broken", null: "not known" };
 const RULE_SIGNS = { true: "✓", false: "✕", null: "?" };
@@ -88,7 +88,7 @@ export class Curate {
       byId("changed-demonstrations"),
       where,
       (name) => element("li", {}, button("", () => this.visit(name.replace(/\.rec$/, "")), { title: `Look at ${name}` })),
-      (child, rows, name) => setText(child.firstElementChild, `${shortName(name)}: ${count(rows, "row")}`),
+      (child, rows, name) => setText(child.firstElementChild, `${this.state.demonstration(name.replace(/\.rec$/, ""))}: ${count(rows, "row")}`),
     );
     keyed(
       byId("changed-words"),
@@ -105,7 +105,7 @@ export class Curate {
     const gone = learner && !learner.there;
     const words = draft.published
       ? "The robot follows this draft."
-      : gone ? "To publish, the learner must run: it hands the tree to the robot." : "Not published: the robot does not know this draft yet.";
+      : gone ? "To publish, the learner must run: it hands the tree to the robot." : "Not published: the robot does not have this draft yet.";
     setText(byId("curate-state"), words);
     byId("publish").disabled = draft.published === true || Boolean(gone);
   }
@@ -131,8 +131,8 @@ export class Curate {
     setText(
       byId("suggestions-hint"),
       suggestions.length
-        ? "What the demonstrations have shown again and again, as branches that you can add to the tree."
-        : "There are none: nothing was shown often enough in the same order.",
+        ? "What was done again and again in the demonstrations, as branches that you can add to the tree."
+        : "There are none: nothing was done often enough in the same order.",
     );
     keyed(
       byId("suggestions"),
@@ -141,6 +141,7 @@ export class Curate {
       (child, one) => {
         const part = child.pieces;
         setText(part.title, one.heading);
+        setAttribute(part.title, "title", one.id);
         setText(part.state, one.attached ? "✓ In the draft" : "");
         setText(part.toggle, one.attached ? "Take it out of the draft" : "Put it into the draft");
         setAttribute(part.toggle, "title", one.attached ? "Removes this branch from the draft" : "Adds this branch to the draft; the robot gets it once you publish");
@@ -196,7 +197,7 @@ export class Curate {
     const versions = Object.entries(this.state.get("versions")).sort().reverse();
     setText(
       byId("versions-hint"),
-      versions.length ? "Every tree that was published. Each can be brought back." : "Nothing was published yet. Each tree that you publish is kept here.",
+      versions.length ? "Every tree that was published. Each can be brought back." : "Nothing has been published yet. Each tree that you publish is kept here.",
     );
     keyed(
       byId("versions"),
@@ -212,7 +213,7 @@ export class Curate {
         const size = version.nodes ? ` · ${count(version.nodes, "node")}` : "";
         setText(about, `${clock(version.when)} · ${version.who}${size}`);
         child.classList.toggle("current", version.current === true);
-        setText(back, version.current ? "✓ The robot follows it" : "Bring it back");
+        setText(back, version.current ? "✓ On the robot" : "Bring it back");
         back.disabled = version.current === true;
       },
     );

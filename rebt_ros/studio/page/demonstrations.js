@@ -2,7 +2,7 @@
 
 import { button, byId, element, keyed, setAttribute, setText, show } from "./dom.js";
 import { chip, thumbnail } from "./thumbnail.js";
-import { clock, count, duration, sentence } from "./words.js";
+import { count, duration, sentence } from "./words.js";
 
 const ORIGINS = { takeover: "takeover", failed: "correction", correction: "correction" };
 
@@ -76,7 +76,7 @@ export class Demonstrations {
     const display = (one) => this.state.shown(one);
     const kind = ORIGINS[shown.origin];
     item.classList.toggle("left-out", !shown.kept);
-    setText(part.title, `${shown.start ? clock(shown.start) : name}${kind ? ` · ${kind}` : ""}`);
+    setText(part.title, `${this.state.demonstration(name)}${kind ? ` · ${kind}` : ""}`);
     const how = shown.deleted ? " · deleted, goes soon" : shown.kept ? "" : " · left out";
     setText(part.about, `${duration(shown.seconds)} · ${count(shown.rows, "row")}${how}`);
     setAttribute(part.picture, "aria-label", `Look inside ${part.title.textContent}`);

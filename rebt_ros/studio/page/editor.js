@@ -34,7 +34,8 @@ export class Editor {
     const shown = (name) => this.state.shown(name);
     const words = node.label === undefined ? renamed(node.text, features(node), shown) : shown(node.label);
     setText(byId("editor-title"), words);
-    const parts = [element("p", {}, sentence(node.explanation))];
+    // What a threshold says is in the title already, and its number in the field below.
+    const parts = isNumeric(node) ? [] : [element("p", {}, sentence(node.explanation))];
     const from = element("div");
     parts.push(from);
     const place = element("div", { class: "place" });
@@ -50,7 +51,7 @@ export class Editor {
   /** Shows in how much of what was shown the branch acts, before somebody deletes it, say. */
   async branch(node, host) {
     const answer = await this.ask("branch", { path: node.path, robot: false }, { quiet: true });
-    if (this.node === node) showBranch(host, answer, this.visit);
+    if (this.node === node) showBranch(host, answer, this.visit, (name) => this.state.demonstration(name));
   }
 
   /** Whether its actions may run at the same time or one after the other. */

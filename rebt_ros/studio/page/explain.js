@@ -5,7 +5,7 @@ import { Strip } from "./strip.js";
 import { thumbnail } from "./thumbnail.js";
 import { Tree, actingPaths, calm, treeTools } from "./tree.js";
 import { showBranch, showNoWhy, showWhy } from "./why.js";
-import { clock, count, duration } from "./words.js";
+import { count, duration, number, yesNo } from "./words.js";
 
 const ROBOT = "";
 
@@ -57,7 +57,7 @@ export class Explain {
       () => element("option"),
       (child, [name, one]) => {
         child.value = name;
-        setText(child, one ? `${one.start ? clock(one.start) : name}: ${duration(one.seconds)}, ${count(one.rows, "row")}` : "the robot, in the last ten minutes");
+        setText(child, one ? `${this.state.demonstration(name)}: ${duration(one.seconds)}, ${count(one.rows, "row")}` : "the robot, in the last ten minutes");
       },
     );
     if (!choices.some(([name]) => name === this.name)) this.name = ROBOT;
@@ -75,7 +75,7 @@ export class Explain {
     this.picture();
     this.render(new Set());
     if (!this.isRobot && this.state.get("demonstrations")[name]) this.at(seconds);
-    else showNoWhy(byId("explain-why"), "Choose a moment: press a point of the picture above.");
+    else showNoWhy(byId("explain-why"), "Choose a moment: press a point of the strip above.");
   }
 
   picture() {
@@ -150,7 +150,7 @@ export class Explain {
       return;
     }
     this.told = answer.data;
-    showWhy(byId("explain-why"), answer.data, this.go);
+    showWhy(byId("explain-why"), answer.data, this.go, (name) => this.state.demonstration(name));
     this.color();
     if (this.acting) this.tree.reveal(this.acting);
   }
@@ -161,7 +161,7 @@ export class Explain {
     const answer = await this.ask("branch", { path: node.path, robot: this.isRobot }, { quiet: true });
     if (this.node !== node) return;
     setText(byId("explain-node"), node.explanation);
-    showBranch(byId("explain-from"), answer, this.go);
+    showBranch(byId("explain-from"), answer, this.go, (name) => this.state.demonstration(name));
     show(byId("explain-branch"), true);
     byId("explain-branch").scrollIntoView({ block: "nearest", behavior: calm() ? "auto" : "smooth" });
   }
@@ -169,21 +169,15 @@ export class Explain {
   color() {
     const { statuses, values, acting } = this.told;
     const shown = values ?? {};
-    const numbers = Object.fromEntries(Object.entries(shown).map(([name, value]) => [name, plain(value)]));
     this.acting = acting ?? [...(this.tree.view ? actingPaths(this.tree.view, statuses, {}) : [])][0] ?? null;
-    this.tree.status(statuses ?? null, numbers, this.acting ? new Set([this.acting]) : null);
+    this.tree.status(statuses ?? null, shown, this.acting ? new Set([this.acting]) : null);
+    show(byId("explain-no-values"), !Object.keys(shown).length);
+    const truths = new Set(this.tree.view?.nodes.filter((node) => node.truth).map((node) => node.feature));
     keyed(
       byId("explain-values"),
       Object.entries(shown).sort(),
       (name) => element("li", {}, element("span", { class: "name" }, this.state.shown(name)), element("span", { class: "value" })),
-      (child, value) => setText(child.children[1], String(value ?? "not known")),
+      (child, value, name) => setText(child.children[1], truths.has(name) ? yesNo(value) : number(value)),
     );
   }
-}
-
-/** A value that came as text, as the number that it is, if it is one. */
-function plain(value) {
-  if (typeof value !== "string") return value;
-  const number = Number(value.replace("−", "-"));
-  return value.trim() !== "" && Number.isFinite(number) ? number : value;
 }

@@ -79,11 +79,11 @@ export class Learn {
     show(byId("learn-progress"), works || awaited);
     if (awaited) {
       byId("learn-bar").removeAttribute("value");
-      setText(byId("learn-stage"), "The tree is learned. Its sizes are on their way…");
+      setText(byId("learn-stage"), "The tree is learned; its sizes are being prepared…");
     }
     if (works) {
       byId("learn-bar").value = stage === "idle" ? 0 : share;
-      setText(byId("learn-stage"), stage === "idle" ? "Starting…" : `${sentence(stage)} ${share} %`);
+      setText(byId("learn-stage"), stage === "idle" ? "Starting…" : `${sentence(stage)} ${share}%`);
     }
   }
 
@@ -100,7 +100,7 @@ export class Learn {
     if (!levels?.some((one) => one.agreement !== null || one.drove)) {
       host.classList.remove("js-plotly-plot");
       host.replaceChildren(
-        element("p", { class: "hint" }, "With several demonstrations there is a chart here: how often each size does what was shown."),
+        element("p", { class: "hint" }, "With several demonstrations, a chart appears here: how often each size does what was shown."),
       );
       return;
     }
@@ -137,7 +137,7 @@ export class Learn {
     recalls.sort((left, right) => (left[1] ?? -1) - (right[1] ?? -1));
     setText(
       byId("learn-recall-hint"),
-      `Of the rows in which you did something, so many the tree does the same in. Always doing the commonest action would be right in ${percent(learning.baseline)}.`,
+      `How often the tree does what you did, for each action. Always doing the most common one would be right in ${percent(learning.baseline)} of all rows.`,
     );
     keyed(
       byId("learn-recalls"),
@@ -150,7 +150,7 @@ export class Learn {
         gauge.firstElementChild.style.background = fillOf(label);
         setText(words, percent(recall));
         child.classList.toggle("never", never.has(label));
-        setText(flag, never.has(label) ? "▲ shown, but the tree never does it: show it more often, or choose a larger tree" : "");
+        setText(flag, never.has(label) ? "▲ You showed it, but the tree never does it: show it more often, or choose a larger tree." : "");
       },
     );
   }
@@ -162,6 +162,9 @@ export class Learn {
     const names = this.state.get("names");
     if (draft.view) this.draft.show(draft.view, names);
     if (tree.view) this.published.show(tree.view, names);
+    // The same tree twice would only leave each less room.
+    show(byId("learn-draft-side"), !draft.published);
+    byId("learn-compare").classList.toggle("even", !draft.published);
     setText(byId("learn-draft-summary"), draft.summary ?? "");
     setText(byId("learn-published-summary"), tree.summary ?? "No tree is published yet.");
     setText(byId("learn-changed"), changedWords(draft));
@@ -178,9 +181,9 @@ export class Learn {
 /** How much of what was shown the draft would do in another way than the robot's tree. */
 export function changedWords(draft) {
   if (!draft.view) return "";
-  if (draft.published) return "The robot follows this very tree.";
+  if (draft.published) return "The robot follows this tree.";
   const { changed } = draft;
   if (!changed) return "There is no published tree to compare with, or it reads other values.";
   if (!changed.rows) return `The draft does the same as the robot's tree in all ${count(changed.of, "row")} that were shown.`;
-  return `The draft does something else than the robot's tree in ${changed.rows} of ${count(changed.of, "row")} (${percent(changed.rows / changed.of)}).`;
+  return `The draft acts differently from the robot's tree in ${changed.rows.toLocaleString("en")} of ${count(changed.of, "row")} (${percent(changed.rows / changed.of)}).`;
 }

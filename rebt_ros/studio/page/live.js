@@ -10,7 +10,7 @@ import { count, number, renamed, sentence, yesNo } from "./words.js";
 
 const CONDITIONS = {
   running: "The tree drives the robot",
-  disabled: "The tree rests: press “Let the tree drive” to start it",
+  disabled: "The tree is stopped: press “Let the tree drive” to start it",
   "waiting for a tree": "The robot waits for a tree",
   paused: "A person has taken over",
   "waiting for state": "The tree waits for the robot's state",
@@ -251,7 +251,7 @@ export class Live {
     this.node = node;
     byId("why-node-from").replaceChildren();
     const answer = await this.ask("branch", { path: node.path, robot: true }, { quiet: true });
-    if (this.node === node) showBranch(byId("why-node-from"), answer, this.visit);
+    if (this.node === node) showBranch(byId("why-node-from"), answer, this.visit, (name) => this.state.demonstration(name));
   }
 
   async why(node) {
@@ -260,7 +260,7 @@ export class Live {
     const given = this.strip.time === null ? {} : { t: this.strip.time };
     const answer = await this.ask("explain", given, { quiet: true });
     if (node) byId("why").scrollIntoView({ block: "nearest", behavior: calm() ? "auto" : "smooth" });
-    if (answer.ok) showWhy(byId("why-text"), answer.data, this.visit);
+    if (answer.ok) showWhy(byId("why-text"), answer.data, this.visit, (name) => this.state.demonstration(name));
     else showNoWhy(byId("why-text"), answer.message);
   }
 }

@@ -25,7 +25,7 @@ const state = new State();
  */
 async function ask(verb, given = {}, { quiet = false, undo = null } = {}) {
   const answer = await connection.ask(verb, given);
-  if (!quiet) say(answer.message, { bad: !answer.ok, undo: answer.ok ? undo : null });
+  if (!quiet) say(answer.message, { bad: !answer.ok, undo: answer.ok ? undo : null, called: (name) => state.demonstration(name) });
   return answer;
 }
 

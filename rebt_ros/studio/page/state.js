@@ -1,5 +1,10 @@
 // What the studio has told: sections of keys and values. The page keeps no other state of the robot.
 
+import { clock, shortName } from "./words.js";
+
+/** The stamps of a robot are times of day from here on (seconds since the epoch). */
+const FIRST_CLOCK = 1e9;
+
 const SECTIONS = [
   "nodes", "tree", "run", "values", "timeline", "actions", "demonstrations", "learning", "draft",
   "versions", "names",
@@ -29,6 +34,13 @@ export class State {
   shown(name) {
     const names = this.sections.names;
     return Object.hasOwn(names, name) ? String(names[name]) : String(name);
+  }
+
+  /** What people call a demonstration: when it began, by the same clock everywhere. */
+  demonstration(name) {
+    const start = this.sections.demonstrations[name]?.start ?? 0;
+    // A simulated clock begins at nought.
+    return start > FIRST_CLOCK ? clock(start) : shortName(name);
   }
 
   /** Calls back with a Set of section names, before the next picture is drawn. */

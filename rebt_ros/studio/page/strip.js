@@ -6,6 +6,8 @@ import { ago, clock, count } from "./words.js";
 
 const SPANS = [60, 600];
 const [ROW, GAP, AXIS, GUTTER] = [30, 4, 22, 62];
+/** Of the words at a mark (pixels). */
+const ROOM = 48;
 const PERIOD = 500;
 /** A person's command that nothing follows counts for so long (seconds). */
 const TAKEOVER = 2;
@@ -191,7 +193,9 @@ export class Strip {
   }
 
   axis(pen, { end, at, faded, height, width }) {
-    const every = this.span > 60 ? 60 : 10;
+    let every = this.span > 60 ? 60 : 10;
+    // Where there is little room, every second mark has words, or every fourth.
+    while ((every / this.span) * (width - GUTTER) < ROOM) every *= 2;
     pen.fillStyle = faded;
     pen.font = "12px system-ui, sans-serif";
     for (let back = 0; back < this.span; back += every) {

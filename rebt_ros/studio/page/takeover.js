@@ -77,7 +77,7 @@ export class Takeover {
     setText(byId("gamepad"), words);
     setText(byId("gamepad-set"), assigning === null ? "Choose gamepad buttons" : "Keep them as they are");
     show(byId("gamepad-set"), Boolean(this.gamepads.name) && this.labels.length > 0);
-    show(byId("hand-back"), this.state.get("nodes").executor?.there === true);
+    show(byId("hand-back"), this.state.get("nodes").executor?.there === true && Boolean(this.state.get("tree").view));
   }
 
   button(label) {

@@ -9,7 +9,7 @@ import { count, sentence } from "./words.js";
 
 /** The section. */
 export class Teach {
-  sections = ["nodes", "actions", "demonstrations", "names"];
+  sections = ["nodes", "actions", "demonstrations", "names", "tree"];
 
   constructor({ state, ask, visit }) {
     this.state = state;
@@ -18,7 +18,7 @@ export class Teach {
     this.demonstrations = new Demonstrations({ state, ask, visit });
     this.on = button("Start recording", () => ask("record", { on: true }), {
       class: "primary big",
-      title: "From now on all that is done is recorded",
+      title: "Records everything that is done from now on",
     });
     this.off = button("Stop recording", () => ask("record", { on: false }), {
       class: "big",
@@ -40,7 +40,7 @@ export class Teach {
   render(changed) {
     this.takeover.active = true;
     this.recorder();
-    if (changed.has("actions") || changed.has("names") || changed.has("nodes")) this.takeover.render();
+    if (changed.has("actions") || changed.has("names") || changed.has("nodes") || changed.has("tree")) this.takeover.render();
     if (changed.has("demonstrations") || changed.has("names")) this.demonstrations.render();
   }
 
@@ -103,7 +103,7 @@ export class Teach {
     if (!isThere) return "Start the recorder; this page notices it by itself.";
     if (!records) return "Press “Start recording”, then drive the robot through the whole task.";
     const origin = values["origin of the demonstration"];
-    if (origin === "failed") return "You show how it is done right, from here to the end. Then press “Well done”.";
+    if (origin === "failed") return "Show how it is done right, from here to the end. Then press “Well done”.";
     if (origin === "takeover") return "You correct the robot. Drive to the end of the task, then press “Well done”.";
     return "Drive through the whole task. At its end press “Well done: next one”; show it three times or more.";
   }
@@ -118,7 +118,7 @@ function figure(key, value) {
     takeovers: "takeovers",
     "rows lost": "rows lost",
     "messages lost": "messages lost",
-    "failed episodes": "failures that were shown right",
+    "failed episodes": "failures that were corrected",
   }[key];
   if (!words || (value === "0" && key !== "rows")) return null;
   return [words, value];

@@ -13,11 +13,11 @@ const LONG = 200;
  * Says a sentence.
  *
  * @param {string} text - What to say.
- * @param {{bad?: boolean, undo?: Function}} [options] - Whether something was refused; what takes
- *   back what was done.
+ * @param {{bad?: boolean, undo?: Function, called?: Function}} [options] - Whether something was
+ *   refused; what takes back what was done; what people call a recording.
  */
-export function say(text, { bad = false, undo = null } = {}) {
-  const words = sentence(withShortNames(text));
+export function say(text, { bad = false, undo = null, called = undefined } = {}) {
+  const words = sentence(withShortNames(text, called));
   if (!words) return;
   const region = byId("toasts");
   const toast = element("div", { class: bad ? "toast bad" : "toast" });

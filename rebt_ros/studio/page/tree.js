@@ -49,6 +49,7 @@ export class Tree {
     this.focused = "root";
     this.query = "";
     this.values = {};
+    this.isSeen = !this.options.live;
     /** The parts in sight, or nearly: what cannot be seen need not be drawn ten times a second. */
     this.near = [];
     this.links = svg("g", { class: "links", "aria-hidden": "true" });
@@ -95,6 +96,11 @@ export class Tree {
     const active = this.ancestors(acting);
     const fits = statuses?.length === this.parts.length;
     this.values = values;
+    // Where not all of it can be seen, it begins at what runs.
+    if (active.size && !this.isSeen && this.host.clientWidth) {
+      this.isSeen = true;
+      if (this.host.scrollWidth > this.host.clientWidth) this.reveal([...acting][0]);
+    }
     this.parts.forEach((part, place) => {
       part.next = fits ? statuses[place] : null;
       const isActive = active.has(part.node.path);
@@ -145,7 +151,8 @@ export class Tree {
     if (meter.value === value) return;
     meter.value = value;
     const known = typeof value === "number";
-    setText(meter.text, meter.needle && !known ? "?" : readText(node, values));
+    const isAnyKnown = Object.keys(values).length > 0;
+    setText(meter.text, isAnyKnown ? (meter.needle && !known ? "?" : readText(node, values)) : "");
     if (!meter.needle) return;
     setAttribute(meter.needle, "visibility", known ? null : "hidden");
     if (known) {

@@ -1,7 +1,7 @@
 // The answer to "why?": what acted, what did not, from which demonstrations that comes.
 
 import { button, element } from "./dom.js";
-import { count, duration, number, sentence, shortName } from "./words.js";
+import { count, duration, number, sentence } from "./words.js";
 
 /**
  * Shows an explanation.
@@ -9,8 +9,9 @@ import { count, duration, number, sentence, shortName } from "./words.js";
  * @param {Element} host - Its content is replaced.
  * @param {{lines: string[], from?: object[], least?: string[]}} data - The studio's answer.
  * @param {(name: string) => void} visit - Goes to a demonstration.
+ * @param {(name: string) => string} called - What people call a demonstration.
  */
-export function showWhy(host, data, visit) {
+export function showWhy(host, data, visit, called) {
   const lines = data.lines ?? [];
   const parts = [];
   lines.forEach((line, place) => {
@@ -24,20 +25,20 @@ export function showWhy(host, data, visit) {
       element("ul", {}, ...least.map((line) => element("li", {}, line.trim()))),
     );
   }
-  if (data.from?.length) parts.push(element("h4", {}, "Learned from"), visits(data.from, visit));
+  if (data.from?.length) parts.push(element("h4", {}, "Learned from"), visits(data.from, visit, called));
   host.replaceChildren(...parts);
 }
 
 /** In how much of what was shown a branch acts, with buttons that lead to where it does. */
-export function showBranch(host, answer, visit) {
+export function showBranch(host, answer, visit, called) {
   const from = answer.data?.from ?? [];
-  host.replaceChildren(element("p", { class: "hint" }, sentence(answer.message)), ...(from.length ? [visits(from, visit)] : []));
+  host.replaceChildren(element("p", { class: "hint" }, sentence(answer.message)), ...(from.length ? [visits(from, visit, called)] : []));
 }
 
-function visits(from, visit) {
+function visits(from, visit, called) {
   const buttons = from.map(({ demonstration, rows, seconds }) => {
     const name = String(demonstration).replace(/\.rec$/, "");
-    const words = `${shortName(name)}: ${count(rows, "row")}${seconds ? `, from ${duration(seconds)} on` : ""}`;
+    const words = `${called(name)}: ${count(rows, "row")}${seconds ? `, from ${duration(seconds)} on` : ""}`;
     return button(words, () => visit(name, seconds), { title: `Look at ${name}` });
   });
   return element("div", { class: "from" }, ...buttons);
@@ -45,7 +46,7 @@ function visits(from, visit) {
 
 /** With numbers that people can read; thresholds are short already. */
 function shortened(line) {
-  return line.replace(/-?\d+\.\d{5,}(?:e[+-]?\d+)?/g, (digits) => number(Number(digits), 4));
+  return line.replace(/-?\d+\.\d{5,}(?:e[+-]?\d+)?/g, (digits) => number(Number(digits), 4).replace("−", "-"));
 }
 
 /** Says that there is no explanation, and why. */

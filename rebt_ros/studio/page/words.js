@@ -35,8 +35,8 @@ export function percent(share) {
   if (share === null || share === undefined) return "–";
   const whole = Math.round(share * 100);
   // Never rounded to all or nothing.
-  if ((whole === 100 && share < 1) || (whole === 0 && share > 0)) return `${(share * 100).toFixed(1)} %`;
-  return `${whole} %`;
+  if ((whole === 100 && share < 1) || (whole === 0 && share > 0)) return `${(share * 100).toFixed(1)}%`;
+  return `${whole}%`;
 }
 
 export function count(amount, noun, several = `${noun}s`) {
@@ -90,15 +90,20 @@ export function renamed(text, names, shown) {
   return text.replace(new RegExp(`(?<![\\p{L}\\p{N}_])(?:${plain})(?![\\p{L}\\p{N}_])`, "gu"), (name) => shown(name));
 }
 
-/** A recording's name without what only machines read. */
+/** When a recording was begun, which its name says in UTC; the name itself where it does not. */
 export function shortName(name) {
   const found = /^(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)/.exec(name);
   if (!found) return name;
-  const [, , month, day, hour, minute, second] = found;
-  return `${day}.${month}. ${hour}:${minute}:${second}`;
+  const [year, month, ...rest] = found.slice(1).map(Number);
+  return clock(Date.UTC(year, month - 1, ...rest) / 1000);
 }
 
-/** A sentence with the names of recordings as people see them, and without their directories. */
-export function withShortNames(text) {
-  return text.replace(/(?:\S*\/)?(\d{8}T\d{6}\.\d+Z-\d+-[0-9a-f]+)(?:\.rec)?/g, (_, name) => shortName(name));
+/**
+ * A sentence with the names of recordings as people see them, and without their directories.
+ *
+ * @param {string} text - With the names of files.
+ * @param {(name: string) => string} called - What people call a recording.
+ */
+export function withShortNames(text, called = shortName) {
+  return text.replace(/(?:\S*\/)?(\d{8}T\d{6}\.\d+Z-\d+-[0-9a-f]+(?:-[12])*)(?:\.rec)?/g, (_, name) => called(name));
 }
