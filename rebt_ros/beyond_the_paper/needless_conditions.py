@@ -20,14 +20,7 @@ from rebt_ros.arrays import BoolArray, WordArray, in_parts
 from rebt_ros.behavior_tree import nodes
 from rebt_ros.behavior_tree.prediction import States, history_columns
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import (
-    Condition,
-    Interval,
-    LastActionIs,
-    Literal,
-    PreviousActionIs,
-    Threshold,
-)
+from rebt_ros.logic.conditions import Condition, Interval, Literal, Threshold
 from rebt_ros.paper.rule_trees import sequence
 
 #: Conditions in a word.
@@ -233,7 +226,7 @@ def _distinct(
     if len(conditions) <= _FEW:
         return _distinct_of_few(conditions, table, shown)
     kinds = np.empty((0, -(-len(conditions) // _BITS)), dtype=np.uint64)
-    for rows, states in _in_parts(conditions, table):
+    for rows, states in _in_parts(table):
         holds = np.empty((len(states), len(conditions)), dtype=bool)
         for place, condition in enumerate(conditions):
             holds[:, place] = states.satisfy(Literal(condition))
@@ -248,7 +241,7 @@ def _distinct_of_few(
 ) -> tuple[int, list[int]]:
     """The same for conditions of which every combination has a place in a short list."""
     occurs = np.zeros(1 << len(conditions), dtype=bool)
-    for rows, states in _in_parts(conditions, table):
+    for rows, states in _in_parts(table):
         kind = np.zeros(len(states), dtype=np.uint16)
         for place, condition in enumerate(conditions):
             kind |= states.satisfy(Literal(condition)).astype(np.uint16) << np.uint16(place)
@@ -257,14 +250,10 @@ def _distinct_of_few(
     return _as_sets(((kinds >> np.arange(len(conditions))) & 1).astype(np.uint8))
 
 
-def _in_parts(
-    conditions: Sequence[Condition], table: DemonstrationTable
-) -> Iterator[tuple[slice, States]]:
+def _in_parts(table: DemonstrationTable) -> Iterator[tuple[slice, States]]:
     """The rows of a large table part by part, and what is known of their states."""
-    looks_back = any(isinstance(one, LastActionIs | PreviousActionIs) for one in conditions)
     for rows in in_parts(len(table)):
-        last = table.last[rows] if looks_back else table.previous[rows]
-        history = history_columns(table.actions, table.previous[rows], last)
+        history = history_columns(table.actions, table.previous[rows], table.last[rows])
         yield rows, States(table.features, table.states[rows], history)
 
 

@@ -24,8 +24,10 @@ from dataclasses import replace
 import numpy as np
 
 from rebt_ros.arrays import FloatArray, IntArray
+from rebt_ros.decision_tree.encoding import encode
 from rebt_ros.decision_tree.fitted import FittedTree
-from rebt_ros.decision_tree.training import fit_again
+from rebt_ros.decision_tree.grown import GrownTree
+from rebt_ros.decision_tree.training import grow_again
 from rebt_ros.demonstration.table import DemonstrationTable
 
 #: Maximum number of leaves and rows for a search.
@@ -49,21 +51,28 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
     rows, leaves = len(table), fitted.leaves
     if leaves > _MOST_LEAVES or rows > _MOST_ROWS or rows < _LEAST_ROWS_PER_LEAF * leaves:
         return fitted
-    right = fitted.right(table)
     tries = min(max(_ROWS_TO_FIT // rows, _LEAST_TRIES), _MOST_TRIES)
+    matrix = encode(table, fitted.vocabulary)
+
+    def right(grown: GrownTree) -> int:
+        """How many rows the tree predicts."""
+        hits = grown.choose(matrix) == table.chosen
+        return int(table.counts(hits.astype(np.int64), 2)[1])
+
     # No tree fits rows that contradict each other.
-    others = (one for one in fit_again(table, fitted, tries, _SHARES) if one.right(table) >= right)
-    trees = [fitted, *others]
+    least = right(fitted.grown)
+    others = grow_again(table, fitted, tries, _SHARES)
+    trees = [fitted.grown, *(one for one in others if right(one) >= least)]
     fewest = min(one.leaves for one in trees)
     smallest = [place for place, one in enumerate(trees) if one.leaves == fewest]
-    if len(smallest) == 1:
-        return trees[smallest[0]]
-    unseen = _crossed(table, fitted.random_state)
-    chosen = np.stack([one.chosen(unseen) for one in trees])
-    comparisons = np.array([one.comparisons for one in trees])
-    voted = _vote(chosen, _COMPARED ** (comparisons - comparisons.min()), len(table.actions))
-    agreeing = (chosen[smallest] == voted).sum(axis=1)
-    return trees[smallest[int(np.argmax(agreeing))]]
+    best = smallest[0]
+    if len(smallest) > 1:
+        unseen = encode(_crossed(table, fitted.random_state), fitted.vocabulary)
+        chosen = np.stack([one.choose(unseen) for one in trees])
+        comparisons = np.array([fitted.comparisons_of(one) for one in trees])
+        voted = _vote(chosen, _COMPARED ** (comparisons - comparisons.min()), len(table.actions))
+        best = smallest[int(np.argmax((chosen[smallest] == voted).sum(axis=1)))]
+    return fitted if best == 0 else fitted.grown_as(trees[best])
 
 
 def _vote(chosen: IntArray, weights: FloatArray, actions: int) -> IntArray:

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -77,9 +77,9 @@ def fit(table: DemonstrationTable, options: FitOptions = PLAIN) -> FittedTree:
         return _fitted(table, options)
 
 
-def fit_again(
+def grow_again(
     table: DemonstrationTable, fitted: FittedTree, draws: int, shares: Sequence[float]
-) -> Iterator[FittedTree]:
+) -> Iterator[GrownTree]:
     """More trees for the same rows, whose splits are chosen from random columns.
 
     Args:
@@ -94,9 +94,9 @@ def fit_again(
         for share in shares:
             classifier = options.classifier().set_params(max_features=share)
             with _quiet():
-                classifier.fit(matrix, table.chosen, sample_weight=weights)
-            grown = _grown(classifier, len(fitted.actions))
-            yield replace(fitted, grown=grown, path=pruning_path(grown))
+                # Checking small tables takes longer than growing trees.
+                classifier.fit(matrix, table.chosen, sample_weight=weights, check_input=False)
+            yield _grown(classifier, len(fitted.actions))
 
 
 def fit_parts(

@@ -46,6 +46,8 @@ class DemonstrationTable:
     """Position in `demonstrations` of each row's demonstration, ascending, shape (rows,)."""
     stamps: IntArray
     """Nanoseconds, shape (rows,)."""
+    last: IntArray = field(init=False)
+    """Position in `actions` of each row's LAT, `NO_ACTION` for none, shape (rows,)."""
     before: IntArray | None = None
     """LAT of each demonstration's first row, as in `last`, shape (demonstrations,), or None."""
     previous: IntArray = None  # type: ignore[assignment]
@@ -56,20 +58,13 @@ class DemonstrationTable:
     """How often the rows of each demonstration count, shape (demonstrations,); None for once."""
     robot: object = None
     """The `RobotFile` that its rows were read with, for trees to carry; None without one."""
-    _last: list[IntArray] = field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
         if self.previous is None:
             previous = previous_actions(self.chosen, self.demonstration)
             object.__setattr__(self, "previous", previous)
-
-    @property
-    def last(self) -> IntArray:
-        """Position in `actions` of each row's LAT, `NO_ACTION` for none, shape (rows,)."""
-        # Most parts of a large table are never asked for it.
-        if not self._last:
-            self._last.append(last_actions(self.chosen, self.demonstration, self.before))
-        return self._last[0]
+        last = last_actions(self.chosen, self.demonstration, self.before)
+        object.__setattr__(self, "last", last)
 
     @property
     def begins(self) -> IntArray:

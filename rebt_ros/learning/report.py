@@ -40,6 +40,9 @@ _LISTED = 12
 _QUOTES = " \t\"'`“”\u2018\u2019«»"
 _BETWEEN_WORDS = re.compile(r"(?<=[^\W\d_])[-_\s]+(?=[^\W\d_])|\s+")
 
+#: Up to this share of what there is to gain, recall is hardly above chance.
+_HARDLY = 0.1
+
 #: Conflicts are mentioned from this share of the rows on.
 _MENTIONED = 0.001
 
@@ -79,12 +82,21 @@ class LearningReport:
 
     @property
     def doubt(self) -> str:
-        """That a simpler policy would do better, without a full stop; empty where none would."""
-        if self.agreement is None or self.agreement >= self.most_frequent:
+        """That a simpler policy would do as well, without a full stop; empty where none would.
+
+        Where an action is rare, a tree that knows when to take it may agree with fewer rows than
+        one that never does.
+        """
+        agreement, recall = self.agreement, self.mean_recall
+        if agreement is None or recall is None or agreement >= self.most_frequent:
+            return ""
+        by_chance = 1 / max(len(self.actions), 1)
+        if recall > by_chance + _HARDLY * (1 - by_chance):
             return ""
         return (
-            f"the forecast, {self.agreement:.1%} agreement, is below the {self.most_frequent:.1%} "
-            "that always taking the most frequent action would reach: show more before it drives"
+            f"the forecast, {agreement:.1%} agreement, is below the {self.most_frequent:.1%} "
+            "that always taking the most frequent action would reach, and mean recall "
+            f"({recall:.1%}) hardly above its {by_chance:.1%}: show more before it drives"
         )
 
     def notes(self) -> Iterator[str]:

@@ -70,11 +70,21 @@ def test_the_figures_are_those_of_the_level_that_was_chosen() -> None:
         assert report.agreement == 0.5
 
 
-@pytest.mark.parametrize(("agreement", "noted"), [(0.6, True), (0.7, False), (None, False)])
-def test_a_forecast_below_what_the_most_frequent_action_would_reach_is_noted(
-    agreement: float | None, *, noted: bool
+@pytest.mark.parametrize(
+    ("agreement", "recall", "noted"),
+    [
+        (0.6, 0.5, True),
+        (0.6, 0.54, True),
+        (0.6, 0.7, False),
+        (0.7, 0.5, False),
+        (None, None, False),
+    ],
+)
+def test_a_forecast_no_better_than_the_most_frequent_action_is_noted(
+    agreement: float | None, recall: float | None, *, noted: bool
 ) -> None:
-    report = LearningReport((), agreement, agreement, 0.7, 0, 0, 10)
+    actions = tuple(ActionReport(label, 5, recall, taken=True) for label in ("go", "turn"))
+    report = LearningReport(actions, recall, agreement, 0.7, 0, 0, 10)
     found = [note for note in report.notes() if "always taking the most frequent action" in note]
     assert found == [report.doubt] * noted
 

@@ -579,7 +579,7 @@ def test_a_tree_that_is_worse_or_of_far_fewer_rows_is_published_with_a_warning(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:
     _record(tmp_path / "demonstrations", 200)
-    noise = random.Random(1)
+    noise = random.Random(2)
     with RecordingWriter(tmp_path / "noise", FEATURES, ["action"]) as writer:
         for step in range(60):
             action = "turn" if noise.random() < 0.4 else "go"
