@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from rebt_ros.decision_tree.encoding import (
     encode,
 )
 from rebt_ros.decision_tree.grown import GrownTree
-from rebt_ros.decision_tree.pruning import PruningPath, pruning_path
+from rebt_ros.decision_tree.pruning import PruningPath
 from rebt_ros.decision_tree.readable_thresholds import shared_thresholds
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -90,16 +90,12 @@ class FittedTree:
     @property
     def leaves(self) -> int:
         """Leaves of the unpruned tree."""
-        return self.grown.leaves
+        return int(np.count_nonzero(self.grown.left < 0))
 
     @property
     def comparisons(self) -> int:
         """Splits of the unpruned tree that compare a number, instead of asking yes or no."""
-        return self.comparisons_of(self.grown)
-
-    def comparisons_of(self, grown: GrownTree) -> int:
-        """The same of another tree for the same columns."""
-        split = grown.column[grown.left >= 0].tolist()
+        split = self.grown.column[self.grown.left >= 0].tolist()
         return sum(isinstance(self.asked[column], Number) for column in split)
 
     @property
@@ -156,9 +152,17 @@ class FittedTree:
         counts = self.grown.counts
         return np.asarray(1 + counts.sum(axis=1) - counts.max(axis=1))
 
-    def grown_as(self, grown: GrownTree) -> FittedTree:
-        """The fit with another tree for the same rows and columns."""
-        return replace(self, grown=grown, path=pruning_path(grown))
+    def right(self, table: DemonstrationTable) -> int:
+        """How many rows the unpruned tree predicts."""
+        return int(self.hits(table, np.zeros(1)).sum())
+
+    def path_lengths(self, table: DemonstrationTable) -> IntArray:
+        """Splits between the root and the leaf that each row reaches, shape (rows,)."""
+        depth = np.zeros(len(self.path.parents), dtype=np.int64)
+        # Parents come before their children.
+        for node in range(1, len(depth)):
+            depth[node] = depth[self.path.parents[node]] + 1
+        return np.asarray(depth[self.reached(table)])
 
     def at(self, ccp_alpha: float) -> TrainedTree:
         """The tree as pruned at `ccp_alpha`; equal to scikit-learn's own fit with it."""

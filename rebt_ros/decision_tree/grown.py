@@ -33,11 +33,6 @@ class GrownTree:
         return len(self.left)
 
     @property
-    def leaves(self) -> int:
-        """Number of leaves."""
-        return int(np.count_nonzero(self.left < 0))
-
-    @property
     def majority(self) -> IntArray:
         """The most frequent action of each node (the first of equals), shape (nodes,)."""
         return np.asarray(np.argmax(self.counts, axis=1))
@@ -64,14 +59,6 @@ class GrownTree:
                 is_leaf[node] = costs[node] <= parted
                 costs[node] = min(costs[node], parted)
         return costs[0], is_leaf
-
-    def choose(self, matrix: Float32Array) -> IntArray:
-        """The action that each row of a matrix leads to, by its position, shape (rows,).
-
-        Args:
-            matrix: Shape (rows, columns).
-        """
-        return np.asarray(self.majority[self.apply(matrix)])
 
     def apply(self, matrix: Float32Array) -> IntArray:
         """The leaf that each row of a matrix reaches, shape (rows,).

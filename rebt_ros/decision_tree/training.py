@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -77,26 +77,26 @@ def fit(table: DemonstrationTable, options: FitOptions = PLAIN) -> FittedTree:
         return _fitted(table, options)
 
 
-def grow_again(
-    table: DemonstrationTable, fitted: FittedTree, draws: int, shares: Sequence[float]
-) -> Iterator[GrownTree]:
-    """More trees for the same rows, whose splits are chosen from random columns.
+def fit_again(
+    table: DemonstrationTable, fitted: FittedTree, number: int, share: float
+) -> FittedTree:
+    """Another tree for the same rows, whose splits are chosen from random columns.
 
     Args:
         table: What a tree was fitted to, without made-up rows.
         fitted: That tree, whose options apply.
-        draws: Number of trees for each share.
-        shares: Shares of the columns that a split is chosen from, in (0, 1].
+        number: Number of the draw.
+        share: Share of the columns that a split is chosen from, in (0, 1].
     """
-    matrix, weights = encode(table, fitted.vocabulary), table.row_weights
-    for draw in range(draws):
-        options = FitOptions(max_depth=fitted.max_depth, random_state=fitted.random_state + draw)
-        for share in shares:
-            classifier = options.classifier().set_params(max_features=share)
-            with _quiet():
-                # Checking small tables takes longer than growing trees.
-                classifier.fit(matrix, table.chosen, sample_weight=weights, check_input=False)
-            yield _grown(classifier, len(fitted.actions))
+    options = FitOptions(
+        fitted.vocabulary, fitted.max_depth, fitted.random_state + number, Upsampling.NONE
+    )
+    classifier = options.classifier().set_params(max_features=share)
+    with _quiet():
+        matrix = encode(table, fitted.vocabulary)
+        classifier.fit(matrix, table.chosen, sample_weight=table.row_weights)
+    grown = _grown(classifier, len(fitted.actions))
+    return replace(fitted, grown=grown, path=pruning_path(grown))
 
 
 def fit_parts(

@@ -121,9 +121,8 @@ def choose(
         # If it is pruned, its size before pruning is not what makes it simple.
         if other is not fitted and (asked or _leaves(other, its) <= _leaves(fitted, ccp_alpha)):
             reasons.append(
-                f"Of the trees that fit the rows, one with {other.leaves} leaves is the simplest "
-                f"({fitted.leaves} where splits are chosen greedily); of those with as few, it "
-                "agrees most often with all these trees."
+                f"Of the trees that fit the rows, one with {_size(other)} is the simplest "
+                f"({_size(fitted)} where splits are chosen greedily)."
             )
             fitted, ccp_alpha = other, its
     return ChosenPolicy(fitted, ccp_alpha, psa, levels, (*reasons, reason), judged.of_all)
@@ -192,6 +191,10 @@ def _unjudged(table: DemonstrationTable, options: LearnOptions, choice: _Choice)
 
 def _leaves(fitted: FittedTree, ccp_alpha: float) -> int:
     return fitted.at(ccp_alpha).tree.leaves
+
+
+def _size(fitted: FittedTree) -> str:
+    return f"{fitted.leaves} leaves and {fitted.comparisons} comparisons of numbers"
 
 
 def _in_words(explanations: tuple[int, int]) -> str:

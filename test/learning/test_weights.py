@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from rebt_ros.arrays import IntArray
 from rebt_ros.commands import learn
 from rebt_ros.decision_tree.fitted import FittedTree
-from rebt_ros.decision_tree.training import FitOptions, fit, fit_parts, grow_again
+from rebt_ros.decision_tree.training import FitOptions, fit, fit_again, fit_parts
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.demonstration.table import DemonstrationTable, tabulate
 from rebt_ros.demonstration.weights import LARGEST_WEIGHT, whole_weights
@@ -79,9 +79,7 @@ def test_a_tree_of_weighed_rows_is_that_of_repeated_rows(
     options = FitOptions(vocabulary=vocabulary)  # type: ignore[arg-type]
     first, second = fit(weighed, options), fit(again, options)
     assert parts(first) == parts(second)
-    others = grow_again(weighed, first, 2, (0.6, 0.8)), grow_again(again, second, 2, (0.6, 0.8))
-    for one, other in zip(*others, strict=True):
-        assert parts(first.grown_as(one)) == parts(second.grown_as(other))
+    assert parts(fit_again(weighed, first, 1, 0.6)) == parts(fit_again(again, second, 1, 0.6))
     assert np.array_equal(
         first.hits(weighed, first.path.alphas), second.hits(again, first.path.alphas)
     )
