@@ -24,7 +24,7 @@ from rebt_ros.demonstration.table import DemonstrationTable
 
 #: Maximum number of leaves and rows for a search.
 _MOST_LEAVES, _MOST_ROWS = 30, 5_000
-_LEAST_ROWS_PER_LEAF = 5
+_LEAST_ROWS_PER_LEAF = 2
 #: Trees tried for each share of the columns that a split is chosen from.
 _TRIES, _SHARES = 30, (0.3, 0.6, 0.8)
 

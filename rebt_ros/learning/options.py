@@ -83,7 +83,7 @@ class LearnOptions:
     """Whether the tree is finally learned from all rows, once it has been judged."""
     simplest: bool = True
     """Whether to search for the simplest tree that fits the rows, instead of growing one greedily:
-    with up to 5000 rows, and in trees of up to 30 leaves with at least 5 rows for each."""
+    with up to 5000 rows, and in trees of up to 30 leaves with at least 2 rows for each."""
     readable_thresholds: bool = True
     """Whether thresholds are moved to round values that splits share, within the gaps between shown
     rows."""

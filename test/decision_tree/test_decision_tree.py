@@ -529,7 +529,7 @@ def test_a_simpler_tree_than_the_greedy_one_is_found() -> None:
 
 
 def test_there_is_no_search_where_a_tree_has_very_many_leaves_or_few_rows_for_each() -> None:
-    few = either_but_not_both(20)
+    few = either_but_not_both(12)
     greedy = fit(few)
     assert greedy.leaves > 4
     assert simplest(few, greedy) is greedy

@@ -36,6 +36,8 @@ ALWAYS = ["decision_tree.dot", "decision_tree.svg", "tree.dot", "tree.json", "tr
 PNG = ["decision_tree.png", "tree.png"]
 #: Fast to learn: nothing to compare.
 OPTIONS = LearnOptions(history=History.NONE, psa=Use.NEVER, max_depth=4)
+#: The simplest tree has levels of its own, and is pruned at one of those of the greedy tree.
+GREEDY = replace(OPTIONS, simplest=False)
 
 
 def rows_of(rows: int = 300, channel: str = "action", noise: float = 0.1) -> list[Row]:
@@ -83,7 +85,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, OfflineLear
     """A directory with all levels, and what was learned."""
     out = tmp_path_factory.mktemp("family")
     table = csv(out / "table.csv", rows_of())
-    return out, rebt_ros.learn([table], out=out, options=OPTIONS, levels=True)
+    return out, rebt_ros.learn([table], out=out, options=GREEDY, levels=True)
 
 
 def entries(out: Path) -> list[dict[str, Any]]:
@@ -123,8 +125,7 @@ def test_every_level_does_what_its_decision_tree_does() -> None:
 
 
 def test_the_chosen_level_is_the_tree_that_was_learned() -> None:
-    # The simplest tree has levels of its own, and is pruned at one of those of the greedy tree.
-    every = family(replace(OPTIONS, refit=False, simplest=False))
+    every = family(replace(GREEDY, refit=False))
     level = every.level(every.chosen)
     assert level.learned == replace(every.learning.learned, suggestions=())
 
@@ -140,7 +141,7 @@ def test_the_chosen_level_of_the_simplest_tree_is_that_tree() -> None:
 
 
 def test_the_chosen_level_of_all_rows_is_judged_by_the_same_level_without_those_held_out() -> None:
-    every = family()
+    every = family(GREEDY)
     level, learning = every.level(every.chosen), every.learning
     published, origin = learning.learned, level.learned.provenance
     figures = published.provenance.figures
