@@ -246,18 +246,22 @@ def how_often(suggestion: Suggestion) -> str:
 
 def summary(learned: LearnedTree) -> str:
     """A line about the tree: its size, what it was learned from and how well it does."""
-    origin, figures = learned.provenance, learned.provenance.figures
-    parts = [
-        _count(nodes.size(learned.tree), "node"),
-        f"learned from {_count(origin.rows, 'row')}"
-        f" of {_count(origin.demonstrations, 'demonstration')}",
-    ]
-    if figures.own_history_agreement is not None:
-        parts.append(
-            f"agrees on {figures.own_history_agreement:.1%}"
-            f" of {_count(figures.held_out_rows, 'held-out row')}"
-        )
-    return " · ".join(parts)
+    figures = learned.provenance.figures
+    if figures.own_history_agreement is None:
+        return size_and_origin(learned)
+    return (
+        f"{size_and_origin(learned)} · agrees on {figures.own_history_agreement:.1%}"
+        f" of {_count(figures.held_out_rows, 'held-out row')}"
+    )
+
+
+def size_and_origin(learned: LearnedTree) -> str:
+    """The same without how well it does, which says nothing of a tree that was changed since."""
+    origin = learned.provenance
+    return (
+        f"{_count(nodes.size(learned.tree), 'node')} · learned from {_count(origin.rows, 'row')}"
+        f" of {_count(origin.demonstrations, 'demonstration')}"
+    )
 
 
 def distinct_texts(values: Iterable[float]) -> dict[float, str]:

@@ -16,12 +16,12 @@ from rebt_ros.behavior_tree.condition_tests import StateTests
 from rebt_ros.behavior_tree.document import dumps
 from rebt_ros.behavior_tree.fingerprint import fingerprint
 from rebt_ros.behavior_tree.learned_tree import LearnedTree
-from rebt_ros.behavior_tree.wording import Wording, quantity_text
+from rebt_ros.behavior_tree.wording import Wording, quantity_text, size_and_origin
 from rebt_ros.errors import OptionError, RebtError
 from rebt_ros.learning import evaluation
 from rebt_ros.learning.learning import Learning
 from rebt_ros.logic.conditions import Interval, Literal, Quantity, Threshold
-from rebt_ros.studio.tree_view import Json, suggestion_views, summary, tree_view
+from rebt_ros.studio.tree_view import Json, suggestion_views, tree_view
 from rebt_ros.trial.tally import Tally
 from rebt_ros.verification.contradictions import agreeing_demands
 from rebt_ros.verification.proof import check
@@ -111,7 +111,7 @@ def draft_view(
     learned = learning.learned
     return {
         "view": tree_view(learned),
-        "summary": summary(learned),
+        "summary": size_and_origin(learned),
         "suggestions": suggestion_views(learned),
         "changed": changed_rows(learning, published),
         "words": list(differences_in_words(published, learned)),

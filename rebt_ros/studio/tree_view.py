@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 from rebt_ros.behavior_tree import nodes, paths
 from rebt_ros.behavior_tree.learned_tree import LearnedTree, SuggestionKind
 from rebt_ros.behavior_tree.shown import Span
-from rebt_ros.behavior_tree.wording import Kind, Wording, how_often, quantity_text
+from rebt_ros.behavior_tree.wording import Kind, Wording, how_often, quantity_text, size_and_origin
 from rebt_ros.drawing.shapes import Line, Node
 from rebt_ros.drawing.tree_picture import drawn_tree
 from rebt_ros.logic.conditions import (
@@ -81,24 +81,6 @@ def suggestion_views(learned: LearnedTree) -> list[dict[str, Json]]:
     ]
 
 
-def summary(learned: LearnedTree) -> str:
-    """A line about the tree: its size, and what it was learned from.
-
-    How well it does is not told: a person may have changed it since.
-    """
-    origin = learned.provenance
-    parts = (
-        _count(nodes.size(learned.tree), "node"),
-        f"learned from {_count(origin.rows, 'row')}"
-        f" of {_count(origin.demonstrations, 'demonstration')}",
-    )
-    return " · ".join(parts)
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"
-
-
 def published_view(learned: LearnedTree, document: str) -> dict[str, Json]:
     """The published tree.
 
@@ -109,7 +91,7 @@ def published_view(learned: LearnedTree, document: str) -> dict[str, Json]:
     return {
         "document": document,
         "view": tree_view(learned),
-        "summary": summary(learned),
+        "summary": size_and_origin(learned),
         "channels": sorted({action.channel for action in learned.actions}),
     }
 
