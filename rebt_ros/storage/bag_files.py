@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import zip_longest
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
@@ -80,6 +81,37 @@ def is_bag(directory: Path) -> bool:
     return (directory / bag_metadata.NAME).exists() or any(map(holds_messages, directory.iterdir()))
 
 
+@dataclass(eq=False)
+class _File:
+    """A file of a bag."""
+
+    name: str
+    counts: Mapping[Topic, int]
+    """Its messages by topic."""
+    read: _Reader
+
+    @cached_property
+    def first(self) -> Message | None:
+        """Its first message.
+
+        Parts of a recording often have as many messages each; that they begin otherwise is read
+        once of each, not of each pair.
+        """
+        return next(self.read(self.counts), None)
+
+    def equals(self, other: _File) -> bool:
+        """Whether both hold the same messages, and any."""
+        return (
+            self.counts == other.counts
+            and any(self.counts.values())
+            and self.first == other.first
+            and all(
+                one == its
+                for one, its in zip_longest(self.read(self.counts), other.read(self.counts))
+            )
+        )
+
+
 @dataclass(slots=True)
 class BagFiles:
     """The open files of a bag."""
@@ -103,8 +135,7 @@ class BagFiles:
     is_incomplete: bool = False
     """Whether messages are missing inside of a file, or between two of them."""
     _readers: list[_Reader] = field(default_factory=list)
-    _files: dict[str, tuple[_Reader, Mapping[Topic, int]]] = field(default_factory=dict)
-    """What reads each file, and its messages by topic."""
+    _files: list[_File] = field(default_factory=list)
 
     def messages(self, topics: Collection[Topic]) -> Iterator[Message]:
         """The messages by the time at which they were recorded; of one instant, as they stand.
@@ -140,21 +171,19 @@ class BagFiles:
         self, name: str, counts: Mapping[Topic, int], stated: Mapping[Topic, int], read: _Reader
     ) -> None:
         """Adds a file, unless it holds the same messages as another one."""
-        for other, (its, its_counts) in self._files.items():
-            if counts == its_counts and any(counts.values()) and _are_one(read, its, counts):
-                self.notes.append(f"{name} holds the same messages as {other}: they are read once")
+        file = _File(name, counts, read)
+        for other in self._files:
+            if file.equals(other):
+                self.notes.append(
+                    f"{name} holds the same messages as {other.name}: they are read once"
+                )
                 return
-        self._files[name] = read, counts
+        self._files.append(file)
         self.found.update(dict.fromkeys(counts, 0))
         self.found.update(counts)
         for topic, count in stated.items():
             self.stated[topic] = self.stated.get(topic, 0) + count
         self._readers.append(read)
-
-
-def _are_one(read: _Reader, other: _Reader, topics: Collection[Topic]) -> bool:
-    """Whether two files that have as many messages on each topic have the same ones."""
-    return all(one == its for one, its in zip_longest(read(topics), other(topics)))
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
 from typing import Any, Final
 
 from rosbags.interfaces import Nodetype
@@ -79,10 +80,18 @@ class BagTypes:
         Raises:
             Exception: The data are no such message; rosbags raises whatever it meets.
         """
-        if not self._own.keys().isdisjoint(types_within(name, self._fields)):
-            if name not in self._decoders:
-                self._decoders[name] = PartialDecoder(name, [()], self._fields).decode
-            return self._decoders[name](data)
+        if name not in self._decoders:
+            self._decoders[name] = self._decoder_of_all(name)
+        return self._decoders[name](data)
+
+    def _decoder_of_all(self, name: str) -> Callable[[bytes], object]:
+        """What decodes messages of a type that is known, with all that is in them."""
+        if self._own.keys().isdisjoint(types_within(name, self._fields)):
+            return partial(self._decode_known, name)
+        return PartialDecoder(name, [()], self._fields).decode
+
+    def _decode_known(self, name: str, data: bytes) -> object:
+        """A message of a type that is that of ROS 2, with all types within it."""
         order = data[:2]
         if len(data) < _HEAD or order not in (_BIG, _LITTLE):
             raise ValueError("it does not begin like a message")
