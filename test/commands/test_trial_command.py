@@ -430,10 +430,14 @@ def test_an_outcome_of_another_type_is_refused(domain: int, peer: Peer, tmp_path
     assert "/outcome carries std_msgs/msg/Float64" in running.err
 
 
+def _reading(topic: str) -> LearnedTree:
+    """A good tree whose state is on another topic."""
+    return replace(GOOD, features=tuple(replace(one, topic=topic) for one in GOOD.features))
+
+
 def test_a_tree_that_gets_no_state_has_not_failed(domain: int, peer: Peer, tmp_path: Path) -> None:
     World(peer)
-    reading = replace(GOOD, features=tuple(replace(one, topic="silent") for one in GOOD.features))
-    (tree,) = _write(tmp_path, good=reading)
+    (tree,) = _write(tmp_path, good=_reading("silent"))
     with (
         executor(domain, tmp_path, peer),
         trial(domain, tmp_path, tree, "--outcome-topic", "outcome") as running,
@@ -460,8 +464,7 @@ def test_an_outcome_that_says_nothing_ends_the_trial(
 
 def test_a_tree_that_the_executor_refuses_is_named(domain: int, peer: Peer, tmp_path: Path) -> None:
     World(peer)
-    reading = replace(GOOD, features=tuple(replace(one, topic="no topic") for one in GOOD.features))
-    (tree,) = _write(tmp_path, odd=reading)
+    (tree,) = _write(tmp_path, odd=_reading("no topic"))
     with (
         executor(domain, tmp_path, peer),
         trial(domain, tmp_path, tree, "--outcome-topic", "outcome") as running,
