@@ -14,9 +14,10 @@ from urllib.parse import urlsplit
 
 import pytest
 import strategies as some
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.task import Future
 from ros_processes import LATCHED, NodeProcess, Peer
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 from studio_client import StudioClient, url_of
 from test_studio import PORT
@@ -90,6 +91,34 @@ def test_the_studio_knows_who_was_killed_and_asks_who_was_started_again(
                 for event in client.board["timeline"].values()
             )
         )
+
+
+def test_what_an_executor_said_before_its_first_report_is_not_forgotten(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    reports = peer.node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+    driving = peer.node.create_publisher(Bool, "executor/driving", LATCHED)
+    report = DiagnosticArray(
+        status=[DiagnosticStatus(hardware_id=f"/{role}") for role in ("learner", "executor")]
+    )
+    with (
+        NodeProcess("studio", domain, tmp_path, PORT) as studio,
+        StudioClient(url_of(studio)) as client,
+    ):
+
+        def are_there() -> bool:
+            reports.publish(report)
+            return all(client.board["nodes"][role]["there"] for role in ("learner", "executor"))
+
+        def learner_is_gone() -> bool:
+            driving.publish(Bool(data=True))
+            return not client.board["nodes"]["learner"]["there"]
+
+        client.wait(are_there)
+        client.wait(learner_is_gone)
+        # It reported when the learner did, and has said since that it drives.
+        assert client.board["nodes"]["executor"]["there"]
+        assert client.board["run"]["driving"] is True
 
 
 def test_a_studio_that_was_killed_knows_everything_again(

@@ -168,6 +168,10 @@ class RobotWatch:
         self._note()
 
     def _on_driving(self, message: Bool) -> None:
+        # One that was started again says so once, maybe before its first report: it must not be
+        # forgotten with the silence of the one before.
+        if "executor" in self._heard:
+            self._heard["executor"] = time.monotonic()
         if self._board.section(Section.RUN).get("driving") == message.data:
             return
         self._board.update(Section.RUN, {"driving": message.data})
