@@ -81,6 +81,12 @@ def test_the_fuzzer_notices(read: object, monkeypatch: pytest.MonkeyPatch) -> No
     assert not _outcome_of(lambda _: None).failed
 
 
+def test_a_pause_of_the_machine_is_no_hang(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign, "LONGEST", 0.2)
+    pauses = iter([0.3])
+    assert not _outcome_of(lambda _: _busy(next(pauses, 0.0))).failed
+
+
 def test_the_same_seed_makes_the_same_inputs(tmp_path: Path) -> None:
     documents = target("documents", tmp_path)
     made = [

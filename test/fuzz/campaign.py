@@ -16,8 +16,10 @@ from typing import Any, Final
 from fuzz.target import Target, target
 from rebt_ros.errors import RebtError
 
-#: An input that takes longer is a hang (seconds of the processor).
+#: An input that takes longer each time is a hang (seconds of the processor).
 LONGEST: Final = 1.0
+#: How often an input that took too long is read before that counts.
+_READINGS: Final = 3
 #: How much the process may grow, whatever it is given (bytes).
 LARGEST_GROWTH: Final = 256 << 20
 
@@ -81,18 +83,19 @@ def each(reader: Target, outcome: Outcome, numbers: range) -> Iterator[int]:
     for number in numbers:
         yield number
         made = reader.make(generator(reader.name, outcome.seed, number))
-        # Of the processor, as a busy machine is no hang; waiting is found by who watches.
-        began = time.process_time()
-        try:
-            reader.read(made)
+        took, error = _reading(reader, made)
+        if error is None:
             outcome.accepted += 1
-        except RebtError as err:
+        elif isinstance(error, RebtError):
             outcome.refused += 1
-            if problem := _problem(str(err)):
-                outcome.fail(number, f"{problem}: {str(err)[:300]!r}")
-        except Exception:
-            outcome.fail(number, traceback.format_exc(limit=-4))
-        took = time.process_time() - began
+            if problem := _problem(str(error)):
+                outcome.fail(number, f"{problem}: {str(error)[:300]!r}")
+        else:
+            outcome.fail(number, "".join(traceback.format_exception(error, limit=-4)))
+        # Once may be the collector's work, or a machine that stood still.
+        for _ in range(_READINGS - 1):
+            if took > LONGEST:
+                took = min(took, _reading(reader, made)[0])
         if took > LONGEST:
             outcome.fail(number, f"took {took:.1f} s")
         outcome.inputs += 1
@@ -100,6 +103,20 @@ def each(reader: Target, outcome: Outcome, numbers: range) -> Iterator[int]:
         outcome.growth = _peak() - before
     if outcome.growth > LARGEST_GROWTH:
         outcome.fail(numbers.stop - 1, f"or one before it: {outcome.growth >> 20} MB more memory")
+
+
+def _reading(reader: Target, made: Any) -> tuple[float, Exception | None]:
+    """How long an input took, and what it raised.
+
+    In seconds of the processor, as a busy machine is no hang; waiting is found by who watches.
+    """
+    began = time.process_time()
+    error = None
+    try:
+        reader.read(made)
+    except Exception as raised:
+        error = raised
+    return time.process_time() - began, error
 
 
 def _problem(sentence: str) -> str:
