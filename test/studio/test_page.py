@@ -678,10 +678,20 @@ def test_learning_shows_how_far_it_is_and_can_be_cancelled(
     page.until(lambda: not page.one("#learn-progress").is_displayed())
 
 
+_ROOM_OF_A_CHART = """const chart = document.createElement('div');
+    chart.className = 'chart';
+    chart.innerHTML = '<p class="hint drawing">Drawing the chart…</p>';
+    document.getElementById('learn-chart').after(chart);
+    const room = chart.offsetHeight;
+    chart.remove();
+    return room;"""
+
+
 def test_a_size_is_chosen_on_the_chart_and_in_the_list(page: Browser, asked: Any) -> None:
     page.section("learn")
     page.sees("never does it", '#learn-recalls [data-key="charge"]')
-    page.one("#learn-chart .main-svg")
+    # Its room was there before it was drawn, so that nothing moves from under a finger.
+    assert page.run(_ROOM_OF_A_CHART) == page.one("#learn-chart .main-svg").size["height"]
     # Agreement, recall, driving trials, and the one in the draft.
     page.until(lambda: len(page.all("#learn-chart .scatterlayer .trace")) == 4)
     page.until(lambda: len(page.all("#learn-chart .errorbar")) == 2)

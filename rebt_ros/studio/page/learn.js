@@ -104,6 +104,9 @@ export class Learn {
       );
       return;
     }
+    if (!host.classList.contains("js-plotly-plot")) {
+      host.replaceChildren(element("p", { class: "hint drawing" }, "Drawing the chart…"));
+    }
     drawLevels(host, levels, level, (number) => this.choose(number)).catch((error) => say(error.message, { bad: true }));
   }
 
