@@ -3,7 +3,9 @@
 Cross-validation judges on rows that a tree was not learned from.  These are the choices:
 
 - whether the tree may test the previous action.  It may if this makes the explanation of the rows
-  much simpler (see `FittedTree.explanation`), whatever cross-validation says.  Between explanations
+  much simpler (see `FittedTree.explanation`), whatever cross-validation says.  Each explanation may
+  use differences of features if that makes it smaller: otherwise, "go on" looks simpler than the
+  staircase of splits that stands for a difference.  Between explanations
   of equal size, the size of the behavior trees decides, then the number of comparisons.  Otherwise
   it may if the explanation is no larger and the mean recall of unpruned trees after their own
   choices is higher.  Events that are sent when the action changes always differ from the previous
@@ -21,7 +23,7 @@ Of the trees that fit the rows equally well, the simplest one is taken (see `sim
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -60,6 +62,9 @@ _LARGE, _ROWS_THAT_TELL = 6_000, 2_000
 
 #: Factor by which the previous action has to shrink the explanation.
 _MUCH_SIMPLER = 0.875
+
+#: What is compared.
+_HISTORIES = (History.NONE, History.PREVIOUS)
 
 #: Up to this share of events, an action hardly ever follows itself.
 _HARDLY = 0.1
@@ -197,10 +202,25 @@ def _size(fitted: FittedTree) -> str:
     return f"{fitted.leaves} leaves and {fitted.comparisons} comparisons of numbers"
 
 
-def _in_words(explanations: tuple[int, int]) -> str:
+@dataclass(frozen=True, slots=True)
+class _Explanation:
+    """An explanation of the rows."""
+
+    fitted: FittedTree
+    differences: int
+    """Offered ones, each of which counts as a leaf."""
+
+    @property
+    def size(self) -> int:
+        return self.fitted.explanation + self.differences
+
+
+def _in_words(before: _Explanation, after: _Explanation) -> str:
     """Sizes of explanations without the previous action and with it."""
-    before, after = explanations
-    return f"{after} leaves and exceptions explain the rows, {before} without it"
+    of = "leaves and exceptions"
+    if before.differences or after.differences:
+        of = "leaves, exceptions and differences of features"
+    return f"{after.size} {of} explain the rows, {before.size} without it"
 
 
 def _always_changes(table: DemonstrationTable) -> bool:
@@ -299,7 +319,9 @@ class _Choice:
             return self._options.history
         if _always_changes(self._telling):
             return History.NONE
-        told, reason = self._explained(FEATURES_ALONE, self._compared(FEATURES_ALONE))
+        told, reason = self._explained(
+            *(self._explanation(replace(FEATURES_ALONE, history=one)) for one in _HISTORIES)
+        )
         if told is None:
             return History.NONE
         self.reasons.append(reason)
@@ -309,49 +331,51 @@ class _Choice:
         asked = self._options.history
         if asked is not None:
             return asked
-        sizes = self._compared(states_alone)
+        before, after = (
+            self._smallest_explanation(replace(states_alone, history=one)) for one in _HISTORIES
+        )
         if _always_changes(self._telling):
-            return self._history_of_changes(states_alone, _in_words(sizes))
-        told, reason = self._explained(states_alone, sizes)
+            return self._history_of_changes(before, after)
+        told, reason = self._explained(before, after)
         if told is not None:
             self.reasons.append(reason)
             return told
-        judged = self._unpruned(states_alone)
+        judged = self._unpruned(before), self._unpruned(after)
         raised = clearly_raised(*judged)
         without, recall = (levels.mean_recalls[0] for levels in judged)
         self.reasons.append(
-            f"The previous action is {'tested' if raised else 'not tested'}: {_in_words(sizes)}, "
-            f"and mean recall after its own choices is {'' if raised else 'not '}clearly higher "
-            f"({recall:.1%}, {without:.1%} without it)."
+            f"The previous action is {'tested' if raised else 'not tested'}: "
+            f"{_in_words(before, after)}, and mean recall after its own choices is "
+            f"{'' if raised else 'not '}clearly higher ({recall:.1%}, {without:.1%} without it)."
         )
         return History.PREVIOUS if raised else History.NONE
 
-    def _compared(self, states_alone: Vocabulary) -> tuple[int, int]:
-        """The sizes of explanations without the previous action and with it."""
-        with_it = replace(states_alone, history=History.PREVIOUS)
-        return self._fitted(states_alone).explanation, self._fitted(with_it).explanation
+    def _explanation(self, vocabulary: Vocabulary) -> _Explanation:
+        return _Explanation(self._fitted(vocabulary), 0)
 
-    def _explained(
-        self, states_alone: Vocabulary, explanations: tuple[int, int]
-    ) -> tuple[History | None, str]:
+    def _smallest_explanation(self, vocabulary: Vocabulary) -> _Explanation:
+        """Without differences, or with all those that a tree makes use of."""
+        found = [self._explanation(vocabulary)]
+        if differences := self._likely_differences(vocabulary):
+            fitted = self._fitted(vocabulary.with_more(differences))
+            found.append(_Explanation(fitted, len(differences)))
+        return min(found, key=lambda one: one.size)
+
+    def _explained(self, before: _Explanation, after: _Explanation) -> tuple[History | None, str]:
         """What explanations say about the previous action, and why; None where they leave it open.
 
         Args:
-            states_alone: What else may be tested.
-            explanations: Their sizes without the previous action and with it.
+            before: Without it.
+            after: With it.
         """
-        before, after = explanations
-        compared = _in_words(explanations)
-        if after <= _MUCH_SIMPLER * before:
+        compared = _in_words(before, after)
+        if after.size <= _MUCH_SIMPLER * before.size:
             return History.PREVIOUS, f"The previous action is tested: {compared}."
-        if after > before:
+        if after.size > before.size:
             return History.NONE, f"The previous action is not tested: {compared}."
-        if after < before:
+        if after.size < before.size:
             return None, ""
-        without_it, with_previous = (
-            simplest(self._telling, self._fitted(replace(states_alone, history=history)))
-            for history in (History.NONE, History.PREVIOUS)
-        )
+        without_it, with_previous = (simplest(self._telling, one.fitted) for one in (before, after))
         sizes = self._sizes(without_it, with_previous)
         if sizes[0] != sizes[1]:
             tested = sizes[1] < sizes[0]
@@ -366,31 +390,27 @@ class _Choice:
             )
         return None, ""
 
-    def _history_of_changes(self, states_alone: Vocabulary, compared: str) -> History:
+    def _history_of_changes(self, before: _Explanation, after: _Explanation) -> History:
         """Whether to test the previous action if each row has another action than the one before.
 
         The previous action then reveals something about each row whatever the state; with two
         actions, everything.  So the size of the explanation says nothing, and the previous action
         is tested only if states hardly determine what to do.
         """
-        without, recall = (levels.mean_recalls[0] for levels in self._unpruned(states_alone))
+        without, recall = (self._unpruned(one).mean_recalls[0] for one in (before, after))
         by_chance = 1 / len(np.unique(self._telling.chosen))
         tested = without < (by_chance + recall) / 2
         self.reasons.append(
-            f"The previous action is {'tested' if tested else 'not tested'}: {compared}; each row "
-            f"is another action than the one before, and states alone "
-            f"{'hardly ' if tested else ''}tell which (mean recall {without:.1%}, {recall:.1%} "
-            "with it)."
+            f"The previous action is {'tested' if tested else 'not tested'}: "
+            f"{_in_words(before, after)}; each row is another action than the one before, and "
+            f"states alone {'hardly ' if tested else ''}tell which (mean recall {without:.1%}, "
+            f"{recall:.1%} with it)."
         )
         return History.PREVIOUS if tested else History.NONE
 
-    def _unpruned(self, states_alone: Vocabulary) -> tuple[JudgedLevels, JudgedLevels]:
-        """How good unpruned trees are, by states alone and with the previous action."""
-        without, with_it = (
-            self.judged(vocabulary, telling=True).unpruned()
-            for vocabulary in (states_alone, replace(states_alone, history=History.PREVIOUS))
-        )
-        return without, with_it
+    def _unpruned(self, explanation: _Explanation) -> JudgedLevels:
+        """How good unpruned trees are that may test what an explanation tests."""
+        return self.judged(explanation.fitted.vocabulary, telling=True).unpruned()
 
     def _fitted(self, vocabulary: Vocabulary) -> FittedTree:
         """A tree fitted to the rows that decide what a tree may test."""

@@ -616,6 +616,36 @@ def test_what_demonstrators_do_by_mistake_counts_once_each_in_an_explanation() -
     assert fit(rows).explanation <= mistakes + 2
 
 
+def turning(seed: int, goals: int = 9) -> DemonstrationTable:
+    """Turns the shorter way to a bearing in degrees, and goes on for a while; three goals each."""
+    random = np.random.default_rng(seed)
+    states: list[tuple[float, float]] = []
+    labels: list[str] = []
+    numbers: list[int] = []
+    heading = 0.0
+    for goal in range(goals):
+        bearing, ahead = random.uniform(0, 360), 16
+        while ahead:
+            off = (bearing - heading + 180) % 360 - 180
+            labels.append("left" if off > 15 else "right" if off < -15 else "go")
+            states.append((round(heading, 1), round(bearing, 1)))
+            numbers.append(goal // 3)
+            heading = (heading + {"left": 12, "right": -12}.get(labels[-1], 0)) % 360
+            ahead -= labels[-1] == "go"
+    plain = table([row[0] for row in states], labels, numbers)
+    features = Feature("heading"), Feature("bearing")
+    return replace(plain, features=features, states=np.array(states), row_kind=RowKind.SAMPLE)
+
+
+@pytest.mark.parametrize("seed", [8, 9, 13])
+def test_going_on_is_not_simpler_than_what_a_difference_explains(seed: int) -> None:
+    policy = choose(turning(seed), LearnOptions())
+    vocabulary = policy.fitted.vocabulary
+    assert vocabulary.history is History.NONE
+    assert vocabulary.combinations == (Difference("heading", "bearing"),)
+    assert "leaves, exceptions and differences of features" in policy.reasons[0]
+
+
 # --- differences --------------------------------------------------------------------------------
 
 

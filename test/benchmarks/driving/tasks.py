@@ -33,6 +33,12 @@ _HOMES = {
     "elevator": "chores.Elevator",
     "sorter": "chores.Sorter",
     "crossing": "chores.Crossing",
+    "guard": "errands.Guard",
+    "compass": "errands.Compass",
+    "waiter": "errands.Waiter",
+    "mower": "errands.Mower",
+    "belt": "errands.Belt",
+    "forage": "errands.Forage",
 }
 NAMES = tuple(_HOMES)
 #: What is driven unless tasks are named: of `knock` it is known that nobody learns it.
