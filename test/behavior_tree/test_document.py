@@ -50,7 +50,6 @@ from rebt_ros.logic.conditions import (
 )
 
 
-
 def _one_of(
     validator: Any, alternatives: list[Any], instance: object, _: object
 ) -> Iterator[ValidationError]:
