@@ -18,8 +18,8 @@ VENV_PYTHON := .venv/bin/python
 COLCON := $(VENV_PYTHON) -P -c 'import sys; from colcon_core.command import main; sys.exit(main())'
 # What colcon writes to be sourced fails where the path of its Python has blanks.
 QUOTED := sed -i 's/"$$($$_colcon_python_executable /"$$("$$_colcon_python_executable" /'
-WORKERS := -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 QUIET := desktop_notification- status-
+WORKERS := -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 SOURCES := rebt_ros test setup.py .ci
 
 # The authors' configurations, or else ones that are made by the paper's rules, always the same.

@@ -320,7 +320,6 @@ def test_without_matplotlib_all_but_png_files_and_the_plot_are_written(tmp_path:
     assert not list(tmp_path.glob("accuracy_vs_alpha*"))
 
 
-@pytest.mark.usefixtures("matplotlib_is_missing")
 def test_each_channel_has_a_directory_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
