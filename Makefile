@@ -19,6 +19,7 @@ COLCON := $(VENV_PYTHON) -P -c 'import sys; from colcon_core.command import main
 # What colcon writes to be sourced fails where the path of its Python has blanks.
 QUOTED := sed -i 's/"$$($$_colcon_python_executable /"$$("$$_colcon_python_executable" /'
 QUIET := desktop_notification- status-
+WORKERS := -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 SOURCES := rebt_ros test setup.py .ci
 
 # The authors' configurations, or else ones that are made by the paper's rules, always the same.
@@ -51,8 +52,9 @@ studio: build ## Show a simulated robot its task, and go on in the studio: learn
 	@. install/local_setup.sh && exec install/rebt_ros/lib/rebt_ros/demo --studio $(ARGS)
 
 # PYTHONSAFEPATH keeps the checkout off Python's path: the tests import what was installed.
-# Two tests run at a time, as they mostly wait for other processes: files stay together.  A worker
-# that crashed is not replaced: pytest-xdist may wait for ever then (its issues 784 and 1323).
+# Two tests run at a time, as they mostly wait for other processes: files stay together, in order, as
+# those of one long test would come last otherwise, and one worker be alone.  A worker that crashed is
+# not replaced: pytest-xdist may wait for ever then (its issues 784 and 1323).
 # colcon test succeeds when tests fail; colcon test-result and the count do not.
 test: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 # Of the studio's page, step by step.
@@ -62,7 +64,7 @@ test: build ## Run the tests on the built package.
 	@status=0; \
 	PYTHONSAFEPATH=1 $(COLCON) test --packages-select rebt_ros \
 	    --event-handlers console_direct+ $(QUIET) \
-	    --pytest-args -n 2 --dist loadfile --max-worker-restart 0 || status=$$?; \
+	    --pytest-args $(WORKERS) || status=$$?; \
 	$(COLCON) test-result --test-result-base build/rebt_ros --verbose || status=$$?; \
 	$(VENV_PYTHON) .ci/count_tests.py build/rebt_ros/pytest.xml || status=$$?; \
 	exit $$status
@@ -73,7 +75,7 @@ test-lowest: export VENV := .venv-lowest
 test-lowest: export CONSTRAINTS ?= .ci/lowest.txt
 test-lowest: ## Run the tests with the lowest versions of all dependencies (ARGS="test/learning", CONSTRAINTS=.ci/jazzy.txt).
 	@.ci/setup.sh
-	@PYTHONPATH=.:$$PYTHONPATH $$VENV/bin/python -m pytest -q -n 2 --dist loadfile --max-worker-restart 0 $(ARGS)
+	@PYTHONPATH=.:$$PYTHONPATH $$VENV/bin/python -m pytest -q $(WORKERS) $(ARGS)
 
 bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 bench: setup ## Measure us and the limit in turn, for docs/performance.md (ARGS="--only tick" for options).

@@ -116,7 +116,7 @@ setup(
             "hypothesis",
             "jsonschema>=4.10",
             "pytest",
-            "pytest-xdist>=3",
+            "pytest-xdist>=3.8",
             "selenium>=4",
         ],
         "upsampling": ["imbalanced-learn>=0.12"],

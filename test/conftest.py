@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -47,6 +48,14 @@ def cache_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> None:
     fonts = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"), "matplotlib")
     os.environ.setdefault("MPLCONFIGDIR", str(fonts))
     os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture
+def matplotlib_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then no PNG files are drawn, which takes longer than all else that a command does."""
+    for name in [*sys.modules, "matplotlib"]:
+        if name.split(".")[0] == "matplotlib":
+            monkeypatch.setitem(sys.modules, name, None)
 
 
 # Their imports wait, because the tests of the core run without ROS.

@@ -268,7 +268,7 @@ class Peer:
         self.close()
 
     def spin_once(self) -> None:
-        self._executor.spin_once(timeout_sec=0.01)
+        self._executor.spin_once(timeout_sec=0.02)
 
     def wait_until(
         self, condition: Callable[[], Any], timeout: float = PATIENCE, what: str = ""

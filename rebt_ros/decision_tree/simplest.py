@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rebt_ros.decision_tree.encoding import Number
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.training import fit_again
 from rebt_ros.demonstration.table import DemonstrationTable
@@ -39,11 +40,18 @@ def simplest(table: DemonstrationTable, fitted: FittedTree) -> FittedTree:
     rows, leaves = len(table), fitted.leaves
     if leaves > _MOST_LEAVES or rows > _MOST_ROWS or rows < _LEAST_ROWS_PER_LEAF * leaves:
         return fitted
+    if leaves <= 2 and (
+        not fitted.comparisons or all(isinstance(one, Number) for one in fitted.asked)
+    ):
+        # None can be simpler.
+        return fitted
+    # Of few columns, several shares are the same number.
+    numbers = dict.fromkeys(max(1, int(share * len(fitted.asked))) for share in _SHARES)
     right = fitted.right(table)
     best, rank = fitted, (fitted.leaves, fitted.comparisons, -np.inf)
     for number in range(_TRIES):
-        for share in _SHARES:
-            other = fit_again(table, fitted, number, share)
+        for among in numbers:
+            other = fit_again(table, fitted, number, among)
             # No tree fits rows that contradict each other.
             if other.leaves <= best.leaves and other.right(table) >= right:
                 its = _rank(table, other)

@@ -49,13 +49,16 @@ class FitOptions:
     upsample: Upsampling = Upsampling.NONE
     """Additional rows to fit the tree to; its leaves count them too."""
 
-    def classifier(self) -> DecisionTreeClassifier:
-        """What is fitted."""
+    def classifier(self, among: int | None = None) -> DecisionTreeClassifier:
+        """What is fitted; each of its splits is chosen from so many columns, or from all."""
         # Importing it takes longer than everything else that shows a learned tree.
         from sklearn.tree import DecisionTreeClassifier
 
         return DecisionTreeClassifier(
-            criterion="gini", max_depth=self.max_depth, random_state=self.random_state
+            criterion="gini",
+            max_depth=self.max_depth,
+            max_features=among,
+            random_state=self.random_state,
         )
 
 
@@ -77,24 +80,26 @@ def fit(table: DemonstrationTable, options: FitOptions = PLAIN) -> FittedTree:
         return _fitted(table, options)
 
 
-def fit_again(
-    table: DemonstrationTable, fitted: FittedTree, number: int, share: float
-) -> FittedTree:
+def fit_again(table: DemonstrationTable, fitted: FittedTree, number: int, among: int) -> FittedTree:
     """Another tree for the same rows, whose splits are chosen from random columns.
 
     Args:
         table: What a tree was fitted to, without made-up rows.
         fitted: That tree, whose options apply.
         number: Number of the draw.
-        share: Share of the columns that a split is chosen from, in (0, 1].
+        among: Number of the columns that a split is chosen from, at least 1.
     """
+    from sklearn import config_context
+
     options = FitOptions(
         fitted.vocabulary, fitted.max_depth, fitted.random_state + number, Upsampling.NONE
     )
-    classifier = options.classifier().set_params(max_features=share)
-    with _quiet():
+    classifier = options.classifier(among)
+    # For few rows, checks of what is known to be right take longer than all else.
+    with _quiet(), config_context(skip_parameter_validation=True):
         matrix = encode(table, fitted.vocabulary)
-        classifier.fit(matrix, table.chosen, sample_weight=table.row_weights)
+        weights = table.row_weights
+        classifier.fit(matrix, table.chosen, sample_weight=weights, check_input=False)
     grown = _grown(classifier, len(fitted.actions))
     return replace(fitted, grown=grown, path=pruning_path(grown))
 

@@ -7,12 +7,13 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import warm_processes
+from warm_processes import HOME
 
-CHECKOUT = Path(__file__).resolve().parents[2]
 ROWS = "".join(
     f"{x / 10},{'no' if x % 3 else 'yes'},{'go' if x < 20 else 'turn'}\n" for x in range(40)
 )
@@ -69,7 +70,7 @@ def _run(
 def _python(
     *arguments: object, shell: str = "", **variables: str | None
 ) -> subprocess.CompletedProcess[str]:
-    environment = dict(os.environ, PYTHONPATH=str(CHECKOUT)) | {
+    environment = dict(os.environ, PYTHONPATH=str(HOME)) | {
         name: value for name, value in variables.items() if value is not None
     }
     for name in [name for name, value in variables.items() if value is None]:
@@ -90,10 +91,12 @@ def _python(
 
 #: Runs modules, each in a process of its own that has imported already what they share.
 _TOGETHER = """
-import importlib, json, os, runpy, sys
+import gc, importlib, json, os, runpy, sys
 directory, calls = sys.argv[1], json.loads(sys.argv[2])
 for module, *_ in calls:
     importlib.import_module(module)
+# Else each of them, as it ends, looks through all that was imported.
+gc.freeze()
 codes = []
 for place, (module, *arguments) in enumerate(calls):
     child = os.fork()
@@ -136,25 +139,36 @@ ENCODINGS: list[dict[str, str | None]] = [
 ]
 
 
-@pytest.mark.parametrize("environment", ENCODINGS, ids=str)
-def test_learn_replay_and_show_write_what_the_terminal_can_show(
-    environment: dict[str, str | None], table: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "out"
+@dataclass(frozen=True)
+class Said:
+    """What commands said where the environment is not what one expects."""
+
+    helps: Sequence[subprocess.CompletedProcess[str]]
+    work: Sequence[subprocess.CompletedProcess[str]]
+    out: Path
+    """Where they wrote."""
+
+
+@pytest.fixture(scope="module", params=ENCODINGS, ids=str)
+def said(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Said:
+    directory = tmp_path_factory.mktemp("environment")
+    table, out = _table(directory), directory / "out"
     tree = out / "tree.json"
-    calls = [("learn", table, "--out", out), ("replay", tree, table), ("show", tree)]
-    for done in _together(tmp_path / "said", *calls, **environment):
+    helps = [(command, "--help") for command in COMMANDS]
+    work = [("learn", table, "--out", out), ("replay", tree, table), ("show", tree)]
+    done = _together(directory / "said", *helps, *work, **request.param)
+    return Said(done[: len(helps)], done[len(helps) :], out)
+
+
+def test_learn_replay_and_show_write_what_the_terminal_can_show(said: Said) -> None:
+    for done in said.work:
         assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
         assert done.stdout
-    assert "dreh … ≤" in (out / "tree.txt").read_text(encoding="utf-8")
+    assert "dreh … ≤" in (said.out / "tree.txt").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("environment", ENCODINGS, ids=str)
-def test_every_command_has_help_for_every_terminal(
-    environment: dict[str, str | None], tmp_path: Path
-) -> None:
-    calls = [(command, "--help") for command in COMMANDS]
-    for done in _together(tmp_path / "said", *calls, **environment):
+def test_every_command_has_help_for_every_terminal(said: Said) -> None:
+    for done in said.helps:
         assert (done.returncode, done.stderr) == (0, ""), done.args
         assert "usage" in done.stdout
 
@@ -229,7 +243,7 @@ def _node(node: str, *arguments: str, shell: str = "") -> subprocess.CompletedPr
     start = [sys.executable, "-m", "rebt_ros.ros.entry", node, *arguments]
     if shell:
         start = ["sh", "-c", f'exec "$@" {shell}', "sh", *start]
-    environment = dict(os.environ, PYTHONPATH=str(CHECKOUT), PYTHONIOENCODING="ascii")
+    environment = dict(os.environ, PYTHONPATH=str(HOME), PYTHONIOENCODING="ascii")
     return subprocess.run(
         start, env=environment, capture_output=True, text=True, timeout=120, check=False
     )

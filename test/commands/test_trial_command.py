@@ -7,7 +7,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,15 @@ import pytest
 pytest.importorskip("rclpy")
 
 import warm_processes
-from ros_processes import LATCHED, PATIENCE, NodeProcess, Peer, values_of, wait_until
+from ros_processes import (
+    LATCHED,
+    PATIENCE,
+    NodeProcess,
+    Peer,
+    own_domain,
+    values_of,
+    wait_until,
+)
 from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import Trigger
 from trial_examples import ALWAYS_GO, ALWAYS_LEFT, ANOTHER, BAD, GOOD
@@ -407,21 +415,6 @@ def test_a_trial_ends_where_nobody_answers(domain: int, peer: Peer, tmp_path: Pa
     assert "standard input was closed" in running.err
 
 
-def test_a_trial_without_an_executor_says_so(domain: int, peer: Peer, tmp_path: Path) -> None:
-    World(peer)
-    (tree,) = _write(tmp_path, go=ALWAYS_GO)
-    with trial(domain, tmp_path, tree, "--outcome-topic", "outcome") as running:
-        running.ends(peer, 1)
-    assert "there is no service /executor/enable" in running.err
-
-
-def test_a_trial_without_a_world_says_so(domain: int, peer: Peer, tmp_path: Path) -> None:
-    (tree,) = _write(tmp_path, go=ALWAYS_GO)
-    with trial(domain, tmp_path, tree, "--outcome-topic", "outcome") as running:
-        running.ends(peer, 1)
-    assert "nobody publishes on /outcome" in running.err
-
-
 def test_an_outcome_of_another_type_is_refused(domain: int, peer: Peer, tmp_path: Path) -> None:
     peer.node.create_publisher(Float64, "outcome", 10)
     (tree,) = _write(tmp_path, go=ALWAYS_GO)
@@ -435,15 +428,30 @@ def _reading(topic: str) -> LearnedTree:
     return replace(GOOD, features=tuple(replace(one, topic=topic) for one in GOOD.features))
 
 
-def test_a_tree_that_gets_no_state_has_not_failed(domain: int, peer: Peer, tmp_path: Path) -> None:
-    World(peer)
-    (tree,) = _write(tmp_path, good=_reading("silent"))
-    with (
-        executor(domain, tmp_path, peer),
-        trial(domain, tmp_path, tree, "--outcome-topic", "outcome") as running,
-    ):
-        running.ends(peer, 1)
-    assert "the executor does not drive: waiting for state: silent (never received)" in running.err
+def test_what_a_trial_waits_for_in_vain_is_named_and_no_failure(tmp_path: Path) -> None:
+    # At the same time, as each of them is patient.
+    without_an_executor, without_a_world, without_a_state = (
+        "there is no service /executor/enable",
+        "nobody publishes on /outcome",
+        "the executor does not drive: waiting for state: silent (never received)",
+    )
+    with ExitStack() as stack:
+        running = []
+        for said in (without_an_executor, without_a_world, without_a_state):
+            domain = stack.enter_context(own_domain())
+            directory = tmp_path / str(domain)
+            directory.mkdir()
+            peer = stack.enter_context(Peer(domain))
+            if said != without_a_world:
+                World(peer)
+            if said == without_a_state:
+                stack.enter_context(executor(domain, directory, peer))
+            (tree,) = _write(directory, tree=_reading("silent"))
+            one = stack.enter_context(trial(domain, directory, tree, "--outcome-topic", "outcome"))
+            running.append((one, peer, said))
+        for one, peer, said in running:
+            one.ends(peer, 1)
+            assert said in one.err
 
 
 def test_an_outcome_that_says_nothing_ends_the_trial(

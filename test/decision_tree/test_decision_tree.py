@@ -24,9 +24,9 @@ from rebt_ros.decision_tree.encoding import (
     encode,
     exact_threshold,
 )
-from rebt_ros.decision_tree.fitted import TrainedTree
+from rebt_ros.decision_tree.fitted import FittedTree, TrainedTree
 from rebt_ros.decision_tree.simplest import simplest
-from rebt_ros.decision_tree.training import FitOptions, fit
+from rebt_ros.decision_tree.training import FitOptions, fit, fit_again
 from rebt_ros.decision_tree.tree import DecisionNode, DecisionTree, Leaf, Split
 from rebt_ros.demonstration.last_action import NO_ACTION, History
 from rebt_ros.demonstration.schema import Feature, FeatureKind
@@ -540,6 +540,36 @@ def test_there_is_no_search_where_a_tree_has_very_many_leaves_or_few_rows_for_ea
     greedy = fit(many)
     assert greedy.leaves == 40
     assert simplest(many, greedy) is greedy
+
+
+def test_no_tree_is_grown_twice_or_where_none_can_be_simpler(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drawn: list[tuple[int, int]] = []
+
+    def again(table: DemonstrationTable, fitted: FittedTree, number: int, among: int) -> FittedTree:
+        drawn.append((number, among))
+        return fit_again(table, fitted, number, among)
+
+    monkeypatch.setattr("rebt_ros.decision_tree.simplest.fit_again", again)
+    numbers = some.FEATURES[:2]
+    turns = [0, 2, 0, 2, 0, 2] * 4
+    three = some.table([(n % 6, n % 6) for n in range(24)], turns, features=numbers)
+    assert simplest(three, fit(three)).leaves == 6
+    # One of two columns, whatever the share.
+    assert drawn == [(number, 1) for number in range(30)]
+    drawn.clear()
+    one = some.table(
+        [(n, n) for n in range(24)], [2 * (n > 9) for n in range(24)], features=numbers
+    )
+    greedy = fit(one)
+    assert greedy.leaves == 2
+    assert simplest(one, greedy) is greedy
+    assert not drawn
+    # A question with the answers yes and no is simpler than a number.
+    docked = some.table([(n, n, n > 9, 0) for n in range(24)], [2 * (n > 9) for n in range(24)])
+    number = fit(docked, FitOptions(random_state=1))
+    assert simplest(docked, number).comparisons == 0
 
 
 # --- paths ------------------------------------------------------------------------------------

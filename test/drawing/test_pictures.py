@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-import sys
 import xml.etree.ElementTree as ET
 from itertools import pairwise
 
@@ -54,13 +53,6 @@ needs_matplotlib = pytest.mark.usefixtures("matplotlib_is_there")
 @pytest.fixture
 def matplotlib_is_there() -> None:
     pytest.importorskip("matplotlib")
-
-
-@pytest.fixture
-def matplotlib_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    loaded = [name for name in sys.modules if name.split(".")[0] == "matplotlib"]
-    for name in {*loaded, "matplotlib"}:
-        monkeypatch.setitem(sys.modules, name, None)
 
 
 def learned(tree: nodes.Node) -> LearnedTree:

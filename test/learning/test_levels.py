@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
@@ -284,6 +283,7 @@ def test_learning_again_leaves_nothing_of_the_levels_before_but_what_others_put_
     assert {*ALWAYS} < set(names(out))
 
 
+@pytest.mark.usefixtures("matplotlib_is_missing")
 def test_levels_that_are_left_out_are_counted_in_a_note(tmp_path: Path) -> None:
     table = csv(tmp_path / "table.csv", rows_of(noise=0.3))
     result = rebt_ros.learn([table], out=tmp_path, options=OPTIONS, levels=True, most_levels=4)
@@ -294,6 +294,7 @@ def test_levels_that_are_left_out_are_counted_in_a_note(tmp_path: Path) -> None:
     assert summary["notes"] == list(result.notes)
 
 
+@pytest.mark.usefixtures("matplotlib_is_missing")
 def test_a_family_that_takes_much_room_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -305,12 +306,8 @@ def test_a_family_that_takes_much_room_says_so(
     assert "MB" in " ".join(result.notes)
 
 
-def test_without_matplotlib_all_but_png_files_and_the_plot_are_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in [*sys.modules, "matplotlib"]:
-        if name.split(".")[0] == "matplotlib":
-            monkeypatch.setitem(sys.modules, name, None)
+@pytest.mark.usefixtures("matplotlib_is_missing")
+def test_without_matplotlib_all_but_png_files_and_the_plot_are_written(tmp_path: Path) -> None:
     (tmp_path / "tree.png").write_bytes(b"of an earlier tree")
     table = csv(tmp_path / "table.csv", rows_of(rows=80))
     result = rebt_ros.learn([table], out=tmp_path, options=OPTIONS, levels=True)
@@ -353,6 +350,7 @@ def test_progress_never_goes_back(tmp_path: Path) -> None:
     assert shares[-1] == 1.0
 
 
+@pytest.mark.usefixtures("matplotlib_is_missing")
 def test_the_command_writes_levels_on_request(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -313,6 +313,7 @@ def revise(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
     return capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("matplotlib_is_missing")
 def test_revise_lists_what_can_be_changed_and_changes_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -334,6 +335,7 @@ def test_revise_lists_what_can_be_changed_and_changes_it(
     assert capsys.readouterr().err.startswith("revise: there is no pruning level 999")
 
 
+@pytest.mark.usefixtures("matplotlib_is_missing")
 def test_revise_exports_again_what_was_exported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
