@@ -382,6 +382,13 @@ def _open_mcap(path: Path, name: str, bag: BagFiles) -> None:
     problems = tuple(_problems(survey))
     bag.is_incomplete |= bool(problems)
     bag.notes += (f"{name} {note}" for note in problems)
+    if survey.unknown:
+        which = _counted(survey.unknown.total(), "record is", "records are")
+        kinds = ", ".join(f"0x{kind:02x}" for kind in sorted(survey.unknown))
+        bag.notes.append(
+            f"{name} is of a later version of its format, or damaged: {which} of kinds that are "
+            f"not known ({kinds}), and passed over"
+        )
     _note_undeclared(survey.undeclared, name, bag)
 
 
