@@ -366,7 +366,7 @@ def _is_record(file: BinaryIO, kind: int, following: int, bound: int) -> bool:
     if following == bound or len(head) < _RECORD_HEAD.size:
         return True
     its, length = _RECORD_HEAD.unpack(head)
-    return its > 0 and following + _RECORD_HEAD.size + length <= bound
+    return bool(its > 0 and following + _RECORD_HEAD.size + length <= bound)
 
 
 def _known_places(file: BinaryIO, end: int) -> list[int]:
