@@ -201,6 +201,7 @@ class RecorderNode(Node):
             origin=origin,
             robot=settings.robot,
             categories=self._categories,
+            told=lambda text: self._faults.note("recording removed", text),
         )
         self.get_logger().info(f"recording to {writer.path}.")
         return writer
@@ -528,6 +529,7 @@ class RecorderNode(Node):
     def _report(self) -> Report:
         now = time.monotonic()
         session = self._session
+        session.look(self._stamp(time.time_ns()))
         self._count_losses()
         values: dict[str, object] = {
             "rows": session.rows,
