@@ -123,7 +123,7 @@ class BagFiles:
     others_found: Counter[str] = field(default_factory=Counter)
     """Messages of those, by topic."""
     definitions: dict[str, str] = field(default_factory=dict)
-    """Definitions of types as `.msg` files have them, by name."""
+    """Definitions of types as `.msg` or `.idl` files have them, by name."""
     redefined: set[str] = field(default_factory=set)
     """Names of types that have several of them, which differ."""
     elsehow: dict[str, str] = field(default_factory=dict)

@@ -32,8 +32,8 @@ _NO_RECORD: Final = -1
 #: Records of kinds from the first on are for later versions of the format, to be passed over; from
 #: the second on, they are a program's own.
 _RESERVED, _PRIVATE = 0x10, 0x80
-#: Encoding of definitions as `.msg` files have them.
-_MSG: Final = "ros2msg"
+#: Encodings of definitions that are read: as `.msg` and `.idl` files have them.
+_DEFINITIONS: Final = ("ros2msg", "ros2idl")
 #: Channel, sequence, log time, publish time: before the data of a message.
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 _RECORD_HEAD: Final = struct.Struct("<BQ")
@@ -82,7 +82,7 @@ class Survey:
 
     channels: dict[int, McapChannel] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
-    """Definitions of types as `.msg` files have them, by name."""
+    """Definitions of types as `.msg` or `.idl` files have them, by name."""
     redefined: set[str] = field(default_factory=set)
     """Names of types that have several of them, which differ."""
     elsehow: dict[str, str] = field(default_factory=dict)
@@ -297,7 +297,7 @@ class McapFile:
             self._schemas[number], place = _text(content, 2)
             encoding, place = _text(content, place)
             name = self._schemas[number]
-            if encoding == _MSG:
+            if encoding in _DEFINITIONS:
                 text, _ = _text(content, place)
                 if differ(name, self.survey.definitions.setdefault(name, text), text):
                     self.survey.redefined.add(name)
