@@ -13,8 +13,8 @@ from rosbags.typesys.base import normalize_fieldname
 
 from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.definition import FILLER, Field, MessageType, Primitive
+from rebt_ros.storage.idl import Definition
 from rebt_ros.storage.message_definitions import (
-    Definition,
     Definitions,
     is_known,
     parse_definitions,
