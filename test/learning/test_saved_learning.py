@@ -31,6 +31,8 @@ from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.learning_file import Saved, load_learning, restored, saved, write_learning
 from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
 from rebt_ros.learning.pipeline import learn_from, summary_sentence
+from rebt_ros.offline import level_files, result
+from rebt_ros.storage.atomic import StorageError, write_text_atomically
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 
@@ -364,6 +366,33 @@ def test_revise_lists_what_can_be_changed_and_changes_it(
     with pytest.raises(SystemExit):
         revise(capsys, tmp_path, "--level", "999")
     assert capsys.readouterr().err.startswith("revise: there is no pruning level 999")
+
+
+@pytest.mark.parametrize("fails", ["tree.dot", "summary.json"])
+def test_where_not_all_files_can_be_written_none_is_of_a_tree_before(
+    fails: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def write(path: Path, text: str) -> None:
+        if path.name == fails:
+            raise StorageError(f"{path} cannot be written.")
+        write_text_atomically(path, text)
+
+    table, out = tmp_path / "table.csv", tmp_path / "out"
+
+    def files(at: int) -> dict[str, bytes]:
+        """What there is after learning to stop from a state on."""
+        rows = (f"{t % 10},{'go' if t % 10 < at else 'stop'}\n" for t in range(60))
+        table.write_text("x,label\n" + "".join(rows))
+        with contextlib.suppress(StorageError):
+            rebt_ros.learn(table, out=out)
+        return {one.name: one.read_bytes() for one in out.iterdir()}
+
+    before = files(3)
+    for module in (level_files, result):
+        monkeypatch.setattr(module, "write_text_atomically", write)
+    left = files(6)
+    assert {"tree.json", "tree.svg", "learning.npz"} <= left.keys() < before.keys()
+    assert not [name for name, data in left.items() if data == before[name]]
 
 
 def test_revise_exports_again_what_was_exported(

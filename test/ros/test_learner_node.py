@@ -503,6 +503,36 @@ def test_the_tree_before_is_published_again_on_request(
         assert not peer.call("/learner/rollback").success
 
 
+def test_a_full_disk_publishes_nothing_and_is_told_of(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        heard = peer.listen(String, "behavior_tree", LATCHED)
+        for rows in (60, 80):
+            _record(tmp_path / "demonstrations", rows, ("go", "stop"))
+            assert peer.call("/learner/relearn").success
+        _latest(peer, heard, 2)
+        pid = learner.process.pid
+        _, most = resource.prlimit(pid, resource.RLIMIT_FSIZE)
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (100, most))
+        for service in ("relearn", "rollback"):
+            answer = peer.call(f"/learner/{service}")
+            assert not answer.success
+            assert (
+                "tree.json cannot be written" in answer.message or "000003.json" in answer.message
+            )
+            status = peer.wait_until(peer.anew("learner: learning"))
+            assert (status.level, answer.message in status.message) == (
+                DiagnosticStatus.WARN,
+                True,
+            )
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (most, most))
+        assert peer.call("/learner/rollback").success
+        _latest(peer, heard, 3)
+        assert heard[2].data == heard[0].data
+
+
 @pytest.mark.parametrize("broken", ["{", None])
 def test_the_newest_tree_is_published_again_where_the_one_on_disk_is_broken_or_gone(
     broken: str | None, domain: int, peer: Peer, tmp_path: Path

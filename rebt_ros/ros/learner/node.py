@@ -38,7 +38,7 @@ from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
 from rebt_ros.ros.graph_watch import Finding, GraphWatch
 from rebt_ros.ros.learner.settings import declare_settings
-from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.atomic import StorageError, write_text_atomically
 from rebt_ros.storage.shared_directory import SharedDirectory, Use
 from rebt_ros.storage.tree_file import find_tree
 from rebt_ros.storage.tree_versions import TreeVersions
@@ -266,7 +266,9 @@ class LearnerNode(Node):
         except LearningError as err:
             # Its end is none of a node's faults.
             if self.context.ok():
-                self.get_logger().warning(f"not all files of the tree were written: {err}")
+                said = f"not all files beside the tree were written: {err}"
+                self.get_logger().warning(said)
+                self._last = Report(Level.WARN, f"{self._last.message} {said}")
             return
         self._log(notes)
         self.get_logger().info(f"summary and pictures of the tree are in {directory.absolute()}.")
@@ -350,6 +352,9 @@ class LearnerNode(Node):
                 learned = loads(document)
             except (RebtError, OSError) as err:
                 response.message = str(err)
+                self.get_logger().warning(f"nothing was published: {err}")
+                if isinstance(err, (StorageError, OSError)):
+                    self._last = Report(Level.WARN, f"nothing was published: {err}")
                 return response
             self._figures = {}
             self._publish(learned, document)
@@ -372,8 +377,8 @@ class LearnerNode(Node):
                     self.get_logger().warning(f"the published tree was not drawn: {err}")
                 return
             self.get_logger().info(
-                f"the pictures in {directory.absolute()} are of the published tree; summary.json "
-                "and the decision tree are of what was learned last."
+                f"the pictures in {directory.absolute()} are of the published tree; summary.json, "
+                "learning.npz and the decision tree are of what was learned last."
             )
 
         threading.Thread(target=draw, daemon=True).start()
