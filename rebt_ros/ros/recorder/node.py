@@ -416,7 +416,10 @@ class RecorderNode(Node):
             [
                 *watch.timeless(),
                 *unfit,
-                *watch.unheard(self._demonstrators),
+                *watch.unheard(
+                    self._demonstrators,
+                    {one.topic_name: "set state_qos to sensor_data" for one in plain},
+                ),
                 *watch.mixed(plain),
                 *watch.latched(one for one in plain if one.topic_name not in known),
                 *watch.misfits(self._driven),
