@@ -411,6 +411,13 @@ def test_a_column_that_is_called_like_labels_and_is_not_the_last_is_noted(
     assert f"{name!r} is a feature: name the label column if it is that one" in read.notes[0]
 
 
+@pytest.mark.parametrize(("separator", "called"), [("\uff0c", "commas"), ("\uff1b", "semicolons")])
+def test_wide_separators_are_separators(separator: str, called: str, tmp_path: Path) -> None:
+    read = _read(tmp_path, "x,y,动作\n1,2,前进\n3,4,停止\n".replace(",", separator))
+    assert read.demonstration.states.tolist() == [[1, 2], [3, 4]]
+    assert f"cells are separated by wide {called}" in read.notes
+
+
 def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Path) -> None:
     read = _read(tmp_path, 'x,a\n"1,207",go\n"3,512",turn\n')
     assert read.demonstration.states[:, 0].tolist() == [1207, 3512]
@@ -429,6 +436,13 @@ def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Pat
         (["1.234.567", "312"], [1_234_567, 312]),
         (["\u22120.5", "0.25"], [-0.5, 0.25]),
         (["\u22121,5 m", "2 m"], [-1.5, 2]),
+        (["(0.5)", "0.25", "(1,250.5)"], [-0.5, 0.25, -1250.5]),
+        (["(5 m)", "2 m"], [-5, 2]),
+        (["€ 0,5", "€12,25", "-€ 3"], [0.5, 12.25, -3]),
+        (["$1,207.50", "$5", "($2)"], [1207.5, 5, -2]),
+        (['="0.5"', '="-2"'], [0.5, -2]),
+        (["٠٫٥", "١٢"], [0.5, 12]),
+        (["１．５", "－２"], [1.5, -2]),
     ],
 )
 def test_numbers_are_read_as_people_write_them(
