@@ -306,6 +306,17 @@ class LearnerNode(Node):
             return f"rules_file cannot be read ({err}), so that no tree is published"
         return ""
 
+    def _unkept(self) -> str:
+        """That the published tree is on disk no more, without a full stop; else empty."""
+        with suppress(RebtError):
+            path = self._settings.output() / _TREE_FILE
+            if self._learned is not None and not path.exists():
+                return (
+                    f"the tree that is published is not in {path.absolute()}, and is gone once "
+                    "this node ends: ~/relearn writes it again"
+                )
+        return ""
+
     def _unwritable(self) -> str:
         """Why no tree can be written, without a full stop; else empty."""
         with suppress(RebtError):
@@ -336,7 +347,8 @@ class LearnerNode(Node):
         return learned
 
     def _versions(self) -> TreeVersions:
-        return TreeVersions(self._settings.output() / _TREES, self._settings.kept_trees())
+        trees = self._settings.output().absolute() / _TREES
+        return TreeVersions(trees, self._settings.kept_trees())
 
     def _rollback(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Publishes the tree before; where none is published, the newest one that was."""
@@ -522,7 +534,13 @@ class LearnerNode(Node):
             "trees",
             "executors without a parameter 'learner' follow one by chance; stop all but one",
         )
-        said = (self._uncounted, self._unruled(), self._unwritable(), self._shared())
+        said = (
+            self._uncounted,
+            self._unruled(),
+            self._unwritable(),
+            self._shared(),
+            self._unkept(),
+        )
         unfit = [Finding(one, waits=False) for one in said if one]
         problems = self._watch.say([*several, *unfit])
         if problems:
