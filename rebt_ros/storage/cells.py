@@ -77,7 +77,10 @@ _MONEY = re.compile(r"(?P<sign>[+-]?) ?(?P<unit>[$€£¥₹]) ?(?P<number>\D?\d
 _FORMULA = re.compile(r'="(?P<number>[^"]*)"')
 #: Decimal points and signs beside digits of other scripts.
 _SIGNS = str.maketrans({"\u066b": ".", "\uff0e": ".", "\uff0d": "-", "\uff0b": "+"})
-_THOUSANDS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{_SEPARATORS}\d{{3}})+(?:\.\d+)?")
+#: In India, there are two digits in all groups but the last.
+_THOUSANDS = re.compile(
+    rf"[+-]?[1-9](?:\d{{0,2}}(?:{_SEPARATORS}\d{{3}})+|\d?(?:,\d\d)+,\d{{3}})(?:\.\d+)?"
+)
 #: Points between them, where they cannot be decimal points: several, or by what other columns say.
 _POINTED = re.compile(r"[+-]?[1-9]\d{0,2}(?:\.\d{3}){2,}")
 _MAYBE_POINTED = re.compile(r"[+-]?(?:0|[1-9]\d{0,2}(?:\.\d{3})*)")

@@ -438,6 +438,7 @@ def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Pat
         (["\u22121,5 m", "2 m"], [-1.5, 2]),
         (["(0.5)", "0.25", "(1,250.5)"], [-0.5, 0.25, -1250.5]),
         (["(5 m)", "2 m"], [-5, 2]),
+        (["1,23,456", "12,34,56,789.5", "1,207"], [123456, 123456789.5, 1207]),
         (["€ 0,5", "€12,25", "-€ 3"], [0.5, 12.25, -3]),
         (["$1,207.50", "$5", "($2)"], [1207.5, 5, -2]),
         (['="0.5"', '="-2"'], [0.5, -2]),
@@ -928,6 +929,27 @@ def test_what_says_the_action_in_other_words_is_no_feature(label: str, tmp_path:
     rows[0][1] = "2"
     read = _read(tmp_path, _written(rows, ["x", f"{label}_id", "command", label]))
     assert [one.name for one in read.demonstration.features] == ["x", f"{label}_id", "command"]
+
+
+def test_a_column_that_holds_the_actions_word_for_word_is_noted_or_no_feature(
+    tmp_path: Path,
+) -> None:
+    rows = [[str(x), "abc"[x % 3], "abc"[x % 3]] for x in range(9)]
+    read = _read(tmp_path, _written(rows, ["x", "label", "action"]))
+    assert [one.name for one in read.demonstration.features] == ["x"]
+    read = _read(tmp_path, _written(rows, ["x", "command", "action"]))
+    assert [one.name for one in read.demonstration.features] == ["x", "command"]
+    assert any("'command' holds the action of each row, word for word" in n for n in read.notes)
+
+
+def test_what_nobody_sees_makes_no_other_actions(tmp_path: Path) -> None:
+    text = "x,action\n1,f\u00e4hrt\n2,fa\u0308hrt\n3,f\u00e4hrt\u200b\n4\u200b,h\u00e4lt\n"
+    for end in ("\n", "\r\n", "\u2028", "\x85"):
+        read = _read(tmp_path, text.replace("\n", end))
+        assert read.demonstration.actions == ("f\u00e4hrt", "h\u00e4lt")
+        assert read.demonstration.states[:, 0].tolist() == [1, 2, 3, 4]
+        assert [note for note in read.notes if "nobody sees" in note]
+        assert [note for note in read.notes if "accents" in note]
 
 
 def test_a_column_for_each_action_is_noted(tmp_path: Path) -> None:
