@@ -89,7 +89,7 @@ def _write(directory: Path, learning: Learning) -> tuple[str, ...]:
     """Writes the trees, their pictures and learning.npz; returns notes, each once."""
     # First what all else can be made of again.
     notes = list(write_learning(directory, learning))
-    with nothing_of_before(directory, ()):
+    with nothing_of_before(directory):
         notes += write_behavior_tree(directory, learning.learned)
         write_text_atomically(directory / "tree.txt", render_text(learning.learned))
         notes += write_decision_tree(directory, learning.decision_tree.tree)

@@ -17,6 +17,7 @@ from rebt_ros.demonstration.together import notes_together
 from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import InputError, OptionError, listing
 from rebt_ros.learning import pipeline
+from rebt_ros.learning.learning_file import NAME as LEARNING_FILE
 from rebt_ros.learning.learning_file import write_learning
 from rebt_ros.learning.levels import check_most_levels
 from rebt_ros.learning.options import LearnOptions
@@ -190,7 +191,7 @@ def write_files(
         StorageError: A file cannot be written.
     """
     channels = [name for name, _ in channel_directories(result.learnings)]
-    with nothing_of_before(directory, channels):
+    with nothing_of_before(directory, channels, [LEARNING_FILE]):
         missing = _write_trees(directory, result, options, most_levels, progress)
         result = replace(result, notes=(*result.notes, *missing))
         write_summary(directory, result, list(map(str, inputs)), options)

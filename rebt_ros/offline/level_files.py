@@ -26,7 +26,6 @@ from rebt_ros.drawing.errors import PictureError
 from rebt_ros.drawing.svg import render_svg
 from rebt_ros.drawing.tree_png import render_decision_tree_png, render_png
 from rebt_ros.learning.learning import Learning
-from rebt_ros.learning.learning_file import NAME as LEARNING_FILE
 from rebt_ros.learning.levels import Levels, PruningLevel
 from rebt_ros.learning.progress import Progress
 from rebt_ros.storage.atomic import StorageError, write_bytes_atomically, write_text_atomically
@@ -50,7 +49,7 @@ _PICTURES = (
     "decision_tree.png",
 )
 _LEVEL_FILES = (TREE_FILE, *_PICTURES)
-_BESIDE_TREE = (*_PICTURES, "tree.txt", LEARNING_FILE, _SUMMARY)
+_BESIDE_TREE = (*_PICTURES, "tree.txt", _SUMMARY)
 
 
 def write_behavior_tree(directory: Path, learned: LearnedTree) -> list[str]:
@@ -148,15 +147,19 @@ def write_levels(directory: Path, levels: Levels, most: int, progress: Progress)
 
 
 @contextlib.contextmanager
-def nothing_of_before(directory: Path, channels: Iterable[Path]) -> Iterator[None]:
+def nothing_of_before(
+    directory: Path, channels: Iterable[Path] = (), further: Iterable[str] = ()
+) -> Iterator[None]:
     """Where not all files can be written, none of an earlier tree stays beside those that were.
 
     Args:
         directory: Of the tree.
         channels: Where the files of each channel's policy go, relative to it.
+        further: Names of files that are written as well.
     """
     written = {directory, *(directory / channel for channel in channels)}
-    files = [one / name for one in sorted(written) for name in _BESIDE_TREE]
+    names = (*_BESIDE_TREE, *further)
+    files = [one / name for one in sorted(written) for name in names]
     before = {path: _mark(path) for path in files}
     try:
         yield
