@@ -464,7 +464,8 @@ class RecorderNode(Node):
     def _record(self, request: SetBool.Request, stamp: int) -> Answer:
         if not request.data:
             return self._session.stop(stamp)
-        if why := self._writable.why_not(self._settings.demonstrations):
+        failed = bool(self._session.failure)
+        if why := self._writable.why_not(self._settings.demonstrations, again=failed):
             return Answer(False, f"not recording: {why}.")
         return self._with_what_is_missing(self._session.start(stamp))
 
