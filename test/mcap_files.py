@@ -87,7 +87,8 @@ def _text(text: str | bytes) -> bytes:
     return struct.pack("<I", len(data)) + data
 
 
-def _record(kind: int, content: bytes) -> bytes:
+def record(kind: int, content: bytes) -> bytes:
+    """A record of a kind."""
     return struct.pack("<BQ", kind, len(content)) + content
 
 
@@ -102,6 +103,7 @@ def write(
     summary: bool = True,
     finished: bool = True,
     profile: str = "ros2",
+    added: bytes = b"",
 ) -> Path:
     """Writes a file.
 
@@ -115,16 +117,17 @@ def write(
         summary: Whether there are statistics and indexes of chunks.
         finished: Whether the file has an end.
         profile: As its head says.
+        added: Stands behind each chunk and its indexes, and in the summary.
     """
     declared = b"".join(
-        _record(
+        record(
             3,
             struct.pack("<H", number + 1)
             + _text(one.kind)
             + _text(one.defined_in)
             + _text(one.definition),
         )
-        + _record(
+        + record(
             4,
             struct.pack("<HH", number, number + 1)
             + _text(one.topic)
@@ -133,7 +136,7 @@ def write(
         )
         for number, one in enumerate(channels)
     )
-    file = bytearray(MAGIC + _record(1, _text(profile) + _text("by hand")))
+    file = bytearray(MAGIC + record(1, _text(profile) + _text("by hand")))
     indexes = []
     size = per_chunk or len(messages) or 1
     parts = [messages[begin : begin + size] for begin in range(0, len(messages), size)]
@@ -142,14 +145,14 @@ def write(
         for one in part:
             head = struct.pack("<HIQQ", one.channel, 0, one.stamp, one.stamp)
             places.setdefault(one.channel, []).append((one.stamp, len(records)))
-            records += _record(5, head + one.data)
+            records += record(5, head + one.data)
         if per_chunk is None:
             file += records
             continue
         stamps = [one.stamp for one in part] or [0]
         packed = _PACK[compression](bytes(records))
         begin = len(file)
-        file += _record(
+        file += record(
             6,
             struct.pack("<QQQI", min(stamps), max(stamps), len(records), zlib.crc32(records))
             + _text(compression.value)
@@ -165,19 +168,20 @@ def write(
         if index:
             for channel, entries in places.items():
                 listed = b"".join(struct.pack("<QQ", *one) for one in entries)
-                file += _record(7, struct.pack("<HI", channel, len(listed)) + listed)
+                file += record(7, struct.pack("<HI", channel, len(listed)) + listed)
+        file += added
     if finished:
-        file += _record(15, struct.pack("<I", 0))
+        file += record(15, struct.pack("<I", 0))
         begin = len(file) if summary else 0
         if summary:
             counts = Counter(one.channel for one in messages)
             listed = b"".join(struct.pack("<HQ", *one) for one in counts.items())
             numbers = (len(messages), len(channels), len(channels), 0, 0, len(indexes), 0, 0)
-            file += declared + b"".join(_record(8, one) for one in indexes)
-            file += _record(
+            file += added + declared + b"".join(record(8, one) for one in indexes)
+            file += record(
                 11, struct.pack("<QHIIIIQQ", *numbers) + struct.pack("<I", len(listed)) + listed
             )
-        file += _record(2, struct.pack("<QQI", begin, 0, 0)) + MAGIC
+        file += record(2, struct.pack("<QQI", begin, 0, 0)) + MAGIC
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(file)
     return path

@@ -82,9 +82,12 @@ class Root(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """How well the tree does; agreements are None where no row was held out for them."""
+    """How well the tree does; agreements are None where no row was held out for them.
 
-    fidelity_mismatches: Count
+    Of a tree that was changed since, so that it does something else, they are all None.
+    """
+
+    fidelity_mismatches: Count | None
     """Rows, of all there were, on which the tree differs from its decision tree."""
     teacher_forced_agreement: Share | None
     """Share of held-out rows on which it agrees, after what the demonstrator did before."""
@@ -94,6 +97,10 @@ class Figures:
     mean_recall: Share | None = None
     """Mean, over the actions of the held-out rows, of the share of each one's rows on which the
     tree takes it, after its own earlier choices."""
+
+    def forgotten(self) -> Figures:
+        """What is left of them where the tree does something else now."""
+        return Figures(None, None, None, self.held_out_rows)
 
 
 @dataclass(frozen=True, slots=True)

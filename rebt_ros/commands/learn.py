@@ -537,10 +537,10 @@ def _suggestions(learned: LearnedTree) -> Iterator[str]:
 def _judgement(result: OfflineLearning) -> str:
     provenance = result.learned.provenance
     figures = provenance.figures
-    lines = [
-        ("decision tree and behavior tree differ on", f"{figures.fidelity_mismatches} rows"),
-        ("may test what was done before", provenance.history.value),
-    ]
+    lines = [("may test what was done before", provenance.history.value)]
+    if figures.fidelity_mismatches is not None:
+        differ = f"{figures.fidelity_mismatches} rows"
+        lines.insert(0, ("decision tree and behavior tree differ on", differ))
     if figures.own_history_agreement is not None:
         assert figures.teacher_forced_agreement is not None
         lines += [

@@ -12,7 +12,11 @@ from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.learning_file import load_learning, write_learning
 from rebt_ros.learning.options import PsaChoice
 from rebt_ros.offline.exports import write_exports_again
-from rebt_ros.offline.level_files import write_behavior_tree, write_decision_tree
+from rebt_ros.offline.level_files import (
+    nothing_of_before,
+    write_behavior_tree,
+    write_decision_tree,
+)
 from rebt_ros.storage.atomic import write_text_atomically
 
 
@@ -83,10 +87,12 @@ def _revise(parsed: argparse.Namespace) -> None:
 
 def _write(directory: Path, learning: Learning) -> tuple[str, ...]:
     """Writes the trees, their pictures and learning.npz; returns notes, each once."""
-    notes = write_behavior_tree(directory, learning.learned)
-    write_text_atomically(directory / "tree.txt", render_text(learning.learned))
-    notes += write_decision_tree(directory, learning.decision_tree.tree)
-    notes += write_learning(directory, learning)
+    # First what all else can be made of again.
+    notes = list(write_learning(directory, learning))
+    with nothing_of_before(directory):
+        notes += write_behavior_tree(directory, learning.learned)
+        write_text_atomically(directory / "tree.txt", render_text(learning.learned))
+        notes += write_decision_tree(directory, learning.decision_tree.tree)
     notes += write_exports_again(directory, learning.learned)
     return tuple(dict.fromkeys(notes))
 

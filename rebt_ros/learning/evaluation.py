@@ -62,6 +62,25 @@ def teacher_forced_choices(tree: nodes.Node, table: DemonstrationTable) -> IntAr
     return choose(tree, actions_of(table), States(table.features, table.states, columns))
 
 
+def does_the_same(
+    one: nodes.Node, other: nodes.Node, table: DemonstrationTable, held_out: BoolArray
+) -> bool:
+    """Whether two trees choose alike in all rows, and in those held out after their own choices.
+
+    Trees with memory are the same only where they are equal.
+    """
+    trees = executable(one), executable(other)
+    if trees[0] == trees[1]:
+        return True
+    if not all(map(nodes.is_reactive, trees)):
+        return False
+    rows = table.where(held_out)
+    return all(
+        np.array_equal(choices(trees[0], its), choices(trees[1], its))
+        for choices, its in ((teacher_forced_choices, table), (own_history_choices, rows))
+    )
+
+
 def own_history_choices(tree: nodes.Node, table: DemonstrationTable) -> IntArray:
     """What the tree chooses in each row after its own choices in the rows before it.
 

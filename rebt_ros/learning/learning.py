@@ -10,6 +10,7 @@ from rebt_ros.behavior_tree.learned_tree import LearnedTree
 from rebt_ros.decision_tree.fitted import TrainedTree
 from rebt_ros.demonstration.table import DemonstrationTable, history_at
 from rebt_ros.errors import OptionError
+from rebt_ros.learning import evaluation
 from rebt_ros.learning.attaching import accept
 from rebt_ros.learning.chosen_policy import ChosenPolicy
 from rebt_ros.learning.levels import Evidence, Levels
@@ -133,7 +134,7 @@ class Learning:
         Raises:
             ValueError: The changed tree has undeclared features or actions.
         """
-        learned = replace(self.learned, tree=edit(self.learned.tree))
+        learned = _changed(self.learned, edit(self.learned.tree), self.evidence)
         offered = tuple(suggestion for suggestion in learned.suggestions if not suggestion.attached)
         plain = replace(learned, suggestions=offered)
         return replace(self, plain=plain)._accepting((), None)
@@ -197,7 +198,7 @@ def learned_as_asked(
         None if sample is None else report_on_sample(sample, table, decision_tree),
     )
     return Learning(
-        replace(plain, tree=tree, suggestions=suggestions),
+        replace(_changed(plain, tree, evidence), suggestions=suggestions),
         plain,
         decision_tree,
         policy,
@@ -206,3 +207,12 @@ def learned_as_asked(
         late,
         further,
     )
+
+
+def _changed(learned: LearnedTree, tree: nodes.Node, evidence: Evidence) -> LearnedTree:
+    """A policy with another tree; without its figures, where that does something else."""
+    if evaluation.does_the_same(learned.tree, tree, evidence.table, evidence.held_out):
+        return replace(learned, tree=tree)
+    origin = learned.provenance
+    provenance = replace(origin, figures=origin.figures.forgotten())
+    return replace(learned, tree=tree, provenance=provenance)

@@ -158,15 +158,18 @@ def _pooled(figures: Sequence[Figures]) -> Figures:
     rows = sum(figure.held_out_rows for figure in figures)
 
     def share(agreements: Sequence[float | None]) -> float | None:
-        agreeing = [
-            agreement * figure.held_out_rows
-            for agreement, figure in zip(agreements, figures, strict=True)
-            if agreement is not None
-        ]
-        return sum(agreeing) / rows if rows else None
+        agreeing = 0.0
+        for agreement, figure in zip(agreements, figures, strict=True):
+            if agreement is not None:
+                agreeing += agreement * figure.held_out_rows
+            elif figure.held_out_rows:
+                # It was changed since.
+                return None
+        return agreeing / rows if rows else None
 
+    differing = [figure.fidelity_mismatches for figure in figures]
     return Figures(
-        sum(figure.fidelity_mismatches for figure in figures),
+        None if None in differing else sum(filter(None, differing)),
         share([figure.teacher_forced_agreement for figure in figures]),
         share([figure.own_history_agreement for figure in figures]),
         rows,
@@ -350,6 +353,8 @@ def summary_sentence(learned: LearnedTree) -> str:
     figures = provenance.figures
     shown = provenance.demonstrations
     judged = "it is not judged, as no rows were held out"
+    if figures.held_out_rows:
+        judged = "it is not judged, as what was attached or edited changes what it does"
     if figures.own_history_agreement is not None:
         # The rows that it was judged on may have been learned from afterwards.
         judged = (

@@ -180,8 +180,8 @@ def learn(
     from rebt_ros.learning import pipeline
     from rebt_ros.learning.options import LearnOptions
     from rebt_ros.offline.result import OfflineLearning
-    from rebt_ros.storage.recording_files import no_recordings
     from rebt_ros.storage.recording_files import recordings as recordings_in
+    from rebt_ros.storage.sources import passed_over
 
     twice = set(request.binary_features) & set(request.categorical_features)
     if twice:
@@ -191,12 +191,14 @@ def learn(
         **dict.fromkeys(request.categorical_features, FeatureKind.CATEGORICAL),
     }
     options = LearnOptions(**request.options)
+    directory = Path(request.demonstrations)
+    files = recordings_in(directory)
     reads = (recordings or KeptRecordings(_read)).read(
-        recordings_in(Path(request.demonstrations)),
+        files,
         lambda share: tell(Progress("reading", _READING * share)),
     )
     notes = [] if notes is None else notes
-    notes += no_recordings(Path(request.demonstrations))
+    notes += passed_over([directory], set(files))
     notes += [f"{read.demonstration.name}: {note}" for read in reads for note in read.notes]
     demonstrations = [read.demonstration for read in reads]
     notes += notes_together(demonstrations)

@@ -47,6 +47,9 @@ class Writer(Protocol):
     def write(self, row: Row) -> None:
         """Adds a row that is durable afterwards."""
 
+    def look(self) -> None:
+        """Sees to it that it is where its path says."""
+
     def sync(self) -> None:
         """Makes its rows survive a loss of power."""
 
@@ -344,6 +347,18 @@ class RecordingSession:
             )
         self._end(stamp)
         self._begin(stamp, Origin.FAILED if self.awaited else Origin.DEMONSTRATION)
+
+    def look(self, stamp: int) -> None:
+        """Sees to it that the rows written so far are where they are said to be."""
+        try:
+            if self._writer is not None:
+                self._writer.look()
+        except RebtError as err:
+            assert self._builder is not None
+            self._abandon(str(err))
+            # The disk refused nothing: there is no need to wait before the next file.
+            self._retry_at = -math.inf
+            self._begin(stamp, self.origin)
 
     def sync(self, stamp: int) -> None:
         """Makes the rows written so far survive a loss of power."""

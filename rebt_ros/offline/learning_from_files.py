@@ -17,6 +17,7 @@ from rebt_ros.demonstration.together import notes_together
 from rebt_ros.drawing.text import render_text
 from rebt_ros.errors import InputError, OptionError, listing
 from rebt_ros.learning import pipeline
+from rebt_ros.learning.learning_file import NAME as LEARNING_FILE
 from rebt_ros.learning.learning_file import write_learning
 from rebt_ros.learning.levels import check_most_levels
 from rebt_ros.learning.options import LearnOptions
@@ -26,6 +27,7 @@ from rebt_ros.offline.level_files import (
     TREE_FILE,
     channel_directories,
     clear_levels,
+    nothing_of_before,
     write_decision_tree,
     write_levels,
     write_tree_pictures,
@@ -171,7 +173,8 @@ def write_files(
 ) -> OfflineLearning:
     """Writes all files of a learned tree but tree.json; see `learn`.
 
-    They may take a while, and which tree is published may change meanwhile.
+    They may take a while, and which tree is published may change meanwhile.  Where one cannot be
+    written, none of an earlier tree stays beside those that were.
 
     Args:
         directory: Where to.
@@ -187,9 +190,11 @@ def write_files(
     Raises:
         StorageError: A file cannot be written.
     """
-    missing = _write_trees(directory, result, options, most_levels, progress)
-    result = replace(result, notes=(*result.notes, *missing))
-    write_summary(directory, result, list(map(str, inputs)), options)
+    channels = [name for name, _ in channel_directories(result.learnings)]
+    with nothing_of_before(directory, channels, [LEARNING_FILE]):
+        missing = _write_trees(directory, result, options, most_levels, progress)
+        result = replace(result, notes=(*result.notes, *missing))
+        write_summary(directory, result, list(map(str, inputs)), options)
     return result
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -28,7 +28,7 @@ from rebt_ros.drawing.tree_png import render_decision_tree_png, render_png
 from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.levels import Levels, PruningLevel
 from rebt_ros.learning.progress import Progress
-from rebt_ros.storage.atomic import write_bytes_atomically, write_text_atomically
+from rebt_ros.storage.atomic import StorageError, write_bytes_atomically, write_text_atomically
 from rebt_ros.storage.tree_file import write_tree
 
 #: The behavior tree document beside its pictures.
@@ -40,8 +40,7 @@ _PLOT = "accuracy_vs_alpha"
 _LONGEST_NAME = 100
 #: Levels that take more room say so.
 _MENTIONED_MEGABYTES = 50
-_LEVEL_FILES = (
-    "tree.json",
+_PICTURES = (
     "tree.svg",
     "tree.dot",
     "tree.png",
@@ -49,6 +48,8 @@ _LEVEL_FILES = (
     "decision_tree.dot",
     "decision_tree.png",
 )
+_LEVEL_FILES = (TREE_FILE, *_PICTURES)
+_BESIDE_TREE = (*_PICTURES, "tree.txt", _SUMMARY)
 
 
 def write_behavior_tree(directory: Path, learned: LearnedTree) -> list[str]:
@@ -143,6 +144,40 @@ def write_levels(directory: Path, levels: Levels, most: int, progress: Progress)
     if megabytes > _MENTIONED_MEGABYTES:
         notes.append(f"the levels take {megabytes:.0f} MB; a smaller --most-levels takes less")
     return list(dict.fromkeys(notes))
+
+
+@contextlib.contextmanager
+def nothing_of_before(
+    directory: Path, channels: Iterable[Path] = (), further: Iterable[str] = ()
+) -> Iterator[None]:
+    """Where not all files can be written, none of an earlier tree stays beside those that were.
+
+    Args:
+        directory: Of the tree.
+        channels: Where the files of each channel's policy go, relative to it.
+        further: Names of files that are written as well.
+    """
+    written = {directory, *(directory / channel for channel in channels)}
+    names = (*_BESIDE_TREE, *further)
+    files = [one / name for one in sorted(written) for name in names]
+    before = {path: _mark(path) for path in files}
+    try:
+        yield
+    except StorageError:
+        for path in files:
+            if _mark(path) == before[path]:
+                path.unlink(missing_ok=True)
+        for one in written:
+            clear_levels(one)
+        raise
+
+
+def _mark(path: Path) -> tuple[int, int] | None:
+    """What tells a file from the one that takes its place; None where there is none."""
+    with contextlib.suppress(OSError):
+        status = path.stat()
+        return status.st_ino, status.st_mtime_ns
+    return None
 
 
 def clear_levels(directory: Path) -> None:

@@ -74,6 +74,11 @@ class Place:
         """Refuses the file, because the value should be something else."""
         self.refuse(f"must be {expected}, not {_SHORT.repr(self.value)}")
 
+    @property
+    def is_map(self) -> bool:
+        """Whether it is a map, which has `items`."""
+        return isinstance(self.value, dict)
+
     def fields(self, *known: str) -> dict[str, Place]:
         """The values of a map that has no other keys than these."""
         fields = dict(self.items())
@@ -85,7 +90,7 @@ class Place:
     def items(self) -> Iterator[tuple[str, Place]]:
         """Keys and values of a map."""
         if not isinstance(self.value, dict):
-            self.must_be("a map")
+            self.must_be("a map, of names and what they stand for")
         for key, value in self.value.items():
             yield key, Place(value, self._name, self._lines, (*self._path, key), self._starts)
 

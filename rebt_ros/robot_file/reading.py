@@ -44,6 +44,7 @@ MOST_RULES: Final = 500
 
 #: Sectors of a Twist where none are named (degrees).
 _SECTORS: Final[Mapping[str, float]] = {"forward": 0.0, "left": 90.0, "back": 180.0, "right": -90.0}
+_PATH_OR_MAP: Final = "a message path, such as /odom.pose.pose.position.x, or a map"
 _LARGEST_AGE: Final = 3600.0
 _MOST_BUTTONS: Final = 1000
 
@@ -177,6 +178,8 @@ def _listed(place: Place) -> list[tuple[str, Place]]:
 def _topic(place: Place) -> TopicSettings:
     if isinstance(place.value, str):
         return TopicSettings(place.text())
+    if not place.is_map:
+        place.must_be("a message type or a map")
     fields = place.fields("type", "stamp")
     return TopicSettings(
         fields["type"].text() if "type" in fields else "",
@@ -187,6 +190,8 @@ def _topic(place: Place) -> TopicSettings:
 def _feature(name: str, place: Place) -> StateFeature:
     if isinstance(place.value, str):
         return StateFeature(name, _path(place))
+    if not place.is_map:
+        place.must_be(_PATH_OR_MAP)
     fields = place.fields("path", "kind", "categories", "max_age")
     if "path" not in fields:
         place.refuse("needs a 'path'")
@@ -207,6 +212,8 @@ def _categories(place: Place) -> dict[str, str]:
         if len(set(texts)) < len(texts):
             place.refuse("name a category twice")
         found = dict(zip(texts, texts, strict=True))
+    elif not place.is_map:
+        place.must_be("a list or a map")
     else:
         found = {key: its.text() for key, its in _listed(place)}
     if not found:
@@ -224,6 +231,8 @@ def _path(place: Place) -> MessagePath:
 def _source(place: Place) -> ActionSource:
     if isinstance(place.value, str):
         return PathActions(_path(place))
+    if not place.is_map:
+        place.must_be(_PATH_OR_MAP)
     kinds = [key for key, _ in place.items() if key in _SOURCES]
     if len(kinds) != 1:
         place.refuse(f"needs one of {', '.join(_SOURCES)}, which says what kind of source it is")
@@ -295,6 +304,13 @@ def _twist_actions(place: Place) -> ActionSource:
         sectors = {key: its.number(-360, 360) for key, its in _listed(fields["sectors"])}
     if not sectors:
         fields["sectors"].refuse("name no sector")
+    directions: dict[float, str] = {}
+    for key, degrees in sectors.items():
+        other = directions.setdefault(degrees % 360, key)
+        if other != key:
+            fields["sectors"].refuse(
+                f"have {other} and {key} in the same direction, so that {key} is never done"
+            )
 
     def number(name: str, default: float, least: float, most: float) -> float:
         return fields[name].number(least, most) if name in fields else default

@@ -21,6 +21,12 @@ LARGEST: Final = 200_000
 #: Deepest nesting of maps and lists.
 DEEPEST: Final = 12
 
+#: What helps where a sign cannot stand, as it is called there.
+_HELPS: Final = {
+    r"'\t'": ": indent with blanks, not with tabs",
+    **{f"character {sign!r}": f": quote what begins with {sign}" for sign in "@`%"},
+}
+
 _WHOLE: Final = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 _DECIMAL: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _WORDS: Final = {
@@ -53,7 +59,8 @@ def read_yaml(text: str, name: str) -> tuple[Json, Lines, Starts]:
     except yaml.MarkedYAMLError as err:
         mark = err.problem_mark or err.context_mark
         line = f", line {mark.line + 1}" if mark else ""
-        raise RobotFileError(f"{name}{line}: this is not YAML ({err.problem}).") from err
+        helps = next((what for sign, what in _HELPS.items() if sign in str(err.problem)), "")
+        raise RobotFileError(f"{name}{line}: this is not YAML ({err.problem}){helps}.") from err
     except yaml.YAMLError as err:
         reason = " ".join(str(err).split())
         raise RobotFileError(f"{name} is not YAML ({reason}).") from err

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 from rclpy.duration import Infinite
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.qos import (
+    DurabilityPolicy,
+    QoSCompatibility,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -70,15 +76,24 @@ class GraphWatch:
                 self._node.get_logger().warning(f"{sentence}.")
         return list(waiting)
 
-    def unheard(self, subscriptions: Iterable[Subscription]) -> Iterator[Finding]:
-        """Why subscriptions hear nothing, or not all."""
+    def unheard(
+        self, subscriptions: Iterable[Subscription], helps: Mapping[str, str] | None = None
+    ) -> Iterator[Finding]:
+        """Why subscriptions hear nothing, or not all; see `misfits`."""
         for subscription in subscriptions:
             if not self._publishers(subscription.topic_name):
                 yield Finding(f"nobody publishes on {subscription.topic_name}", waits=True)
-            yield from self.misfits([subscription])
+            yield from self.misfits([subscription], helps)
 
-    def misfits(self, subscriptions: Iterable[Subscription]) -> Iterator[Finding]:
-        """Publishers that subscriptions cannot hear."""
+    def misfits(
+        self, subscriptions: Iterable[Subscription], helps: Mapping[str, str] | None = None
+    ) -> Iterator[Finding]:
+        """Publishers that subscriptions cannot hear.
+
+        Args:
+            subscriptions: Those of this node.
+            helps: What helps against publishers of best effort, by the full name of the topic.
+        """
         for subscription in subscriptions:
             topic, wanted = subscription.topic_name, _type_of(subscription)
             for publisher in self._publishers(topic):
@@ -92,9 +107,11 @@ class GraphWatch:
                 fit, reason = qos_check_compatible(publisher.qos_profile, subscription.qos_profile)
                 if fit == QoSCompatibility.ERROR:
                     name = _name(publisher)
+                    is_brief = publisher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+                    advice = (helps or {}).get(topic, "") if is_brief else ""
                     yield Finding(
                         f"{name} offers incompatible QoS on {topic}, and none of its messages is "
-                        f"received ({_plain(reason)})",
+                        f"received ({_plain(reason)}){f': {advice}' if advice else ''}",
                         waits=name == _UNKNOWN,
                     )
 

@@ -123,7 +123,7 @@ class BagFiles:
     others_found: Counter[str] = field(default_factory=Counter)
     """Messages of those, by topic."""
     definitions: dict[str, str] = field(default_factory=dict)
-    """Definitions of types as `.msg` files have them, by name."""
+    """Definitions of types as `.msg` or `.idl` files have them, by name."""
     redefined: set[str] = field(default_factory=set)
     """Names of types that have several of them, which differ."""
     elsehow: dict[str, str] = field(default_factory=dict)
@@ -382,6 +382,13 @@ def _open_mcap(path: Path, name: str, bag: BagFiles) -> None:
     problems = tuple(_problems(survey))
     bag.is_incomplete |= bool(problems)
     bag.notes += (f"{name} {note}" for note in problems)
+    if survey.unknown:
+        which = _counted(survey.unknown.total(), "record is", "records are")
+        kinds = ", ".join(f"0x{kind:02x}" for kind in sorted(survey.unknown))
+        bag.notes.append(
+            f"{name} is of a later version of its format, or damaged: {which} of kinds that are "
+            f"not known ({kinds}), and passed over"
+        )
     _note_undeclared(survey.undeclared, name, bag)
 
 

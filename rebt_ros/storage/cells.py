@@ -17,8 +17,10 @@ Dates and times are no features, and neither are texts that hardly ever recur.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
+from functools import partial
+from unicodedata import decimal
 
 import numpy as np
 
@@ -68,7 +70,17 @@ _NO_NAMES = frozenset({"true", "false", "yes", "no"})
 _SEPARATORS = "[ ,'\u2019\u00a0\u202f]"
 #: What typesetters write for minus.
 _MINUS = "\u2212"
-_THOUSANDS = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{_SEPARATORS}\d{{3}})+(?:\.\d+)?")
+#: How accountants write a number below zero, and amounts of money.
+_BELOW_ZERO = re.compile(r"\((?P<number>[^()+-]*\d[^()]*)\)")
+_MONEY = re.compile(r"(?P<sign>[+-]?) ?(?P<unit>[$€£¥₹]) ?(?P<number>\D?\d.*)")
+#: A text that a spreadsheet is kept from reading as a number.
+_FORMULA = re.compile(r'="(?P<number>[^"]*)"')
+#: Decimal points and signs beside digits of other scripts.
+_SIGNS = str.maketrans({"\u066b": ".", "\uff0e": ".", "\uff0d": "-", "\uff0b": "+"})
+#: In India, there are two digits in all groups but the last.
+_THOUSANDS = re.compile(
+    rf"[+-]?[1-9](?:\d{{0,2}}(?:{_SEPARATORS}\d{{3}})+|\d?(?:,\d\d)+,\d{{3}})(?:\.\d+)?"
+)
 #: Points between them, where they cannot be decimal points: several, or by what other columns say.
 _POINTED = re.compile(r"[+-]?[1-9]\d{0,2}(?:\.\d{3}){2,}")
 _MAYBE_POINTED = re.compile(r"[+-]?(?:0|[1-9]\d{0,2}(?:\.\d{3})*)")
@@ -327,10 +339,9 @@ def _in_notation(
         note = f"column {name!r} is read as numbers, which are hexadecimal"
         return _numeric(name, np.array([int(cell, 16) if cell else np.nan for cell in cells]), note)
     said: list[str] = []
-    if any(_MINUS in cell for cell in distinct):
-        distinct = {cell.replace(_MINUS, "-") for cell in distinct}
-        cells = [cell.replace(_MINUS, "-") for cell in cells]
-        said.append(f"with {_MINUS} for minus")
+    for change, how in _changes(set(distinct) - {""}):
+        distinct, cells = set(map(change, distinct)), list(map(change, cells))
+        said.append(how)
     units = {_unit(cell) for cell in distinct}
     if len(units) == 1 and (unit := units.pop()):
         cells = [_without_unit(cell) for cell in cells]
@@ -338,16 +349,44 @@ def _in_notation(
     values = numbers(cells)
     how = ""
     if values is None:
-        decimal = _with_points(cells, decimal_commas=decimal_commas)
-        if decimal is None:
+        pointed = _with_points(cells, decimal_commas=decimal_commas)
+        if pointed is None:
             return None
-        cells, how = decimal
+        cells, how = pointed
         said.append(how)
         values = numbers(cells)
     if values is None or not said:
         return None
     note = f"column {name!r} is read as numbers, {' and '.join(said)}"
     return _numeric(name, values, note, decimal_commas=how == _WITH_COMMAS)
+
+
+def _changes(filled: Set[str]) -> Iterator[tuple[Callable[[str], str], str]]:
+    """What makes usual numbers of all cells that are not empty, and how each is called."""
+    if all(map(_FORMULA.fullmatch, filled)):
+        change = partial(_FORMULA.sub, r"\g<number>")
+        yield change, "without the formulas around them"
+        filled = set(map(change, filled))
+    if any(map(_has_foreign_digits, filled)):
+        yield _with_usual_digits, "with digits of another script"
+    if any(_MINUS in cell for cell in filled):
+        yield lambda cell: cell.replace(_MINUS, "-"), f"with {_MINUS} for minus"
+    below_zero = list(map(_BELOW_ZERO.fullmatch, filled))
+    if any(below_zero) and not all(below_zero):
+        yield partial(_BELOW_ZERO.sub, r"-\g<number>"), "with parentheses for minus"
+        filled = {_BELOW_ZERO.sub(r"-\g<number>", cell) for cell in filled}
+    signs = {found["unit"] if (found := _MONEY.fullmatch(cell)) else "" for cell in filled}
+    if len(signs) == 1 and (sign := signs.pop()):
+        yield partial(_MONEY.sub, r"\g<sign>\g<number>"), f"without their unit {sign}"
+
+
+def _has_foreign_digits(cell: str) -> bool:
+    return not cell.isascii() and any(one.isdecimal() and not one.isascii() for one in cell)
+
+
+def _with_usual_digits(cell: str) -> str:
+    usual = (str(decimal(one)) if one.isdecimal() else one for one in cell)
+    return "".join(usual).translate(_SIGNS)
 
 
 def _unit(cell: str) -> str:

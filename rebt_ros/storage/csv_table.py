@@ -54,7 +54,13 @@ from rebt_ros.storage.no_rows import NoRow
 from rebt_ros.storage.read import Part, Read
 from rebt_ros.storage.records import Records, read_records
 from rebt_ros.storage.stamp_column import falls, stamps_of
-from rebt_ros.storage.table_doubts import actions_again, of_actions, of_choices, of_features
+from rebt_ros.storage.table_doubts import (
+    actions_again,
+    of_actions,
+    of_choices,
+    of_features,
+    same_words,
+)
 
 #: A column of this name holds each row's stamp, in nanoseconds, and is not a feature.
 STAMP = "stamp"
@@ -341,6 +347,7 @@ def _actions_again(shown: _Shown, known: Set[str], notes: list[str]) -> frozense
     }
     found = actions_again(table.columns[table.labels[0]], columns, actions)
     notes += [f"column {name!r} says what the action is and is no feature" for name in found]
+    notes += same_words({name: columns[name] for name in columns if name not in found}, actions)
     return frozenset(found)
 
 

@@ -10,7 +10,15 @@ from dataclasses import dataclass
 from itertools import dropwhile, islice
 
 #: What may separate cells, the usual one first, with its name.
-_DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
+_DELIMITERS = {
+    ",": "commas",
+    ";": "semicolons",
+    "\t": "tabs",
+    "|": "bars",
+    " ": "blanks",
+    "\uff0c": "wide commas",
+    "\uff1b": "wide semicolons",
+}
 #: Records that tell.
 _FIRST = 50
 

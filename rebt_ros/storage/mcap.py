@@ -29,11 +29,11 @@ MAGIC: Final = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _INDEX, _CHUNK_INDEX, _STATISTICS = *range(2, 9), 11
 #: What stands where no record does.
 _NO_RECORD: Final = -1
-#: Records of kinds from here on are a program's own.
-_PRIVATE: Final = 0x80
-_KINDS: Final = frozenset({*range(1, 16), *range(_PRIVATE, 0x100)})
-#: Encoding of definitions as `.msg` files have them.
-_MSG: Final = "ros2msg"
+#: Records of kinds from the first on are for later versions of the format, to be passed over; from
+#: the second on, they are a program's own.
+_RESERVED, _PRIVATE = 0x10, 0x80
+#: Encodings of definitions that are read: as `.msg` and `.idl` files have them.
+_DEFINITIONS: Final = ("ros2msg", "ros2idl")
 #: Channel, sequence, log time, publish time: before the data of a message.
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 _RECORD_HEAD: Final = struct.Struct("<BQ")
@@ -82,7 +82,7 @@ class Survey:
 
     channels: dict[int, McapChannel] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
-    """Definitions of types as `.msg` files have them, by name."""
+    """Definitions of types as `.msg` or `.idl` files have them, by name."""
     redefined: set[str] = field(default_factory=set)
     """Names of types that have several of them, which differ."""
     elsehow: dict[str, str] = field(default_factory=dict)
@@ -105,6 +105,8 @@ class Survey:
     """Numbers of the parts that end inside of a record."""
     is_complete: bool = False
     """Whether the file has its end."""
+    unknown: Counter[int] = field(default_factory=Counter)
+    """Records outside of chunks by their kind, of kinds that the format has not had so far."""
     behind: int = 0
     """Bytes behind that, unless the first of them are zero."""
     in_order: bool = True
@@ -116,6 +118,11 @@ class Survey:
     def undeclared(self) -> int:
         """Messages of channels that the file does not describe."""
         return sum(count for channel, count in self.found.items() if channel not in self.channels)
+
+    @property
+    def is_short(self) -> bool:
+        """Whether the file says that it holds messages that were not found."""
+        return any(self.stated_of(channel) > self.found[channel] for channel in self.channels)
 
     def stated_of(self, channel: int) -> int:
         """Messages of a channel that the file says it holds, or that it was found to hold."""
@@ -232,6 +239,7 @@ class McapFile:
         survey.packed_by.clear()
         survey.gaps.clear()
         survey.indexed.clear()
+        survey.unknown.clear()
         for kind, start, length in _records(self._file):
             if kind == _CHUNK:
                 if loose:
@@ -257,6 +265,14 @@ class McapFile:
                 content = self._content(start, length)
                 survey.stated = _stated(content)
                 survey.total = None if survey.stated else _total(content)
+            elif _is_reserved(kind):
+                survey.unknown[kind] += 1
+                if survey.is_short:
+                    # It may have been one of messages.
+                    if loose:
+                        yield bytes(loose)
+                        loose.clear()
+                    yield None
             elif kind == _NO_RECORD:
                 survey.gaps.append((start, start + length))
                 if loose:
@@ -281,7 +297,7 @@ class McapFile:
             self._schemas[number], place = _text(content, 2)
             encoding, place = _text(content, place)
             name = self._schemas[number]
-            if encoding == _MSG:
+            if encoding in _DEFINITIONS:
                 text, _ = _text(content, place)
                 if differ(name, self.survey.definitions.setdefault(name, text), text):
                     self.survey.redefined.add(name)
@@ -323,7 +339,7 @@ def _records(file: BinaryIO) -> Iterator[tuple[int, int, int]]:
         following = place + _RECORD_HEAD.size + length
         later = bisect_right(known, place)
         bound = known[later] if later < len(known) else end
-        if kind in _KINDS and following <= bound:
+        if following <= bound and _is_record(file, kind, following, bound):
             yield kind, place + _RECORD_HEAD.size, length
             if kind == _FOOTER:
                 return
@@ -332,9 +348,25 @@ def _records(file: BinaryIO) -> Iterator[tuple[int, int, int]]:
             yield _NO_RECORD, place, bound - place
             place = bound
         else:
-            if kind not in _KINDS:
+            if not kind or _is_reserved(kind):
                 yield _NO_RECORD, place, end - place
             return
+
+
+def _is_reserved(kind: int) -> bool:
+    return _RESERVED <= kind < _PRIVATE
+
+
+def _is_record(file: BinaryIO, kind: int, following: int, bound: int) -> bool:
+    """Whether what begins like a record that fits is one; it may be damage where it is unknown."""
+    if not _is_reserved(kind):
+        return kind > 0
+    file.seek(following)
+    head = file.read(_RECORD_HEAD.size)
+    if following == bound or len(head) < _RECORD_HEAD.size:
+        return True
+    its, length = _RECORD_HEAD.unpack(head)
+    return bool(its > 0 and following + _RECORD_HEAD.size + length <= bound)
 
 
 def _known_places(file: BinaryIO, end: int) -> list[int]:

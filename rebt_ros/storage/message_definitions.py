@@ -1,4 +1,4 @@
-"""Message definitions as bags hold them: the text of a `.msg` file, and of those it needs.
+"""Message definitions as bags hold them: the text of a `.msg` or `.idl` file, and of its needs.
 
 They come from outside: what a line does not say in the plain form of a field or a constant is
 passed over, and nothing is made of them but names and types.
@@ -13,9 +13,9 @@ from typing import Any, Final, TypeAlias
 
 from rosbags.interfaces import Nodetype
 
-#: Constants and fields of a type, in the form of rosbags.
-Definition: TypeAlias = tuple[list[tuple[str, str, Any]], list[tuple[str, Any]]]
-#: Those of each type.
+from rebt_ros.storage.idl import Definition, parse_idl
+
+#: Constants and fields of each type.
 Definitions: TypeAlias = dict[str, Definition]
 
 #: Longest text that is read, in characters, and most types in it.
@@ -23,7 +23,8 @@ LARGEST: Final = 500_000
 _MOST_TYPES: Final = 500
 
 _SEPARATOR: Final = re.compile(r"^={20,}\s*$", re.MULTILINE)
-_HEAD: Final = re.compile(r"\s*MSG:\s*([A-Za-z]\w*(?:/[A-Za-z]\w*){1,2})\s*$", re.ASCII)
+_HEAD: Final = re.compile(r"\s*(MSG|IDL):\s*([A-Za-z]\w*(?:/[A-Za-z]\w*){1,2})\s*$", re.ASCII)
+_MODULE: Final = re.compile(r"^[ \t]*module\s+\w+\s*\{", re.ASCII | re.MULTILINE)
 _LINE: Final = re.compile(
     r"\s*([A-Za-z][\w/]*)(?:<=\d+)?(\[(?:<=)?\d*\])?[ \t]+([A-Za-z]\w*)[ \t]*(=?)(.*)", re.ASCII
 )
@@ -41,14 +42,20 @@ def parse_definitions(name: str, text: str) -> Definitions:
         text: The text.
     """
     found: Definitions = {}
-    for place, part in enumerate(_SEPARATOR.split(text[:LARGEST])[:_MOST_TYPES]):
+    parts = _SEPARATOR.split(text[:LARGEST])[:_MOST_TYPES]
+    for place, part in enumerate(parts):
+        head = None
         kind, lines = name, part.strip("\n").split("\n")
         if place:
             head = _HEAD.fullmatch(lines[0])
             if head is None:
                 continue
-            kind, lines = _full_name(head[1], ""), lines[1:]
-        found.setdefault(kind, _parsed(kind, lines))
+            kind, lines = _full_name(head[2], ""), lines[1:]
+        if (head is not None and head[1] == "IDL") or _MODULE.search(part):
+            for one, its in parse_idl("\n".join(lines)).items():
+                found.setdefault(one, its)
+        elif place or part.strip() or len(parts) == 1:
+            found.setdefault(kind, _parsed(kind, lines))
     return found
 
 

@@ -13,8 +13,8 @@ from rosbags.typesys.base import normalize_fieldname
 
 from rebt_ros.errors import MessagePathError
 from rebt_ros.message_path.definition import FILLER, Field, MessageType, Primitive
+from rebt_ros.storage.idl import Definition
 from rebt_ros.storage.message_definitions import (
-    Definition,
     Definitions,
     is_known,
     parse_definitions,
@@ -28,13 +28,15 @@ _BIG, _LITTLE = b"\0\0", b"\0\1"
 #: What rclpy.serialization leaves behind an empty array of numbers of 8 bytes, or two.
 _MOST_PADDING: Final = 15
 
+#: Types of one byte that `.msg` and `.idl` files call otherwise.
+_BYTES: Final = dict.fromkeys(("byte", "octet", "char"), "uint8")
+
 _PRIMITIVES: Final = {
     "bool": Primitive.TRUTH,
     "byte": Primitive.BYTE,
     "octet": Primitive.BYTE,
     "float32": Primitive.NUMBER,
     "float64": Primitive.NUMBER,
-    "float128": Primitive.NUMBER,
     "string": Primitive.TEXT,
     "wstring": Primitive.TEXT,
 }
@@ -44,10 +46,10 @@ class BagTypes:
     """The types of ROS 2 Jazzy, and those that a bag defines.
 
     Args:
-        definitions: Definitions in the bag by the name of their type, as `.msg` files have them,
-            those of the types within them included.  They are looked at when they are needed.
-            Where ROS 2 has another type of that name, as in another distribution, the messages of
-            the bag are those of the bag's.
+        definitions: Definitions in the bag by the name of their type, as `.msg` or `.idl` files
+            have them, those of the types within them included.  They are looked at when they are
+            needed.  Where ROS 2 has another type of that name, as in another distribution, the
+            messages of the bag are those of the bag's.
         elsehow: How the bag defines types where it does so otherwise, by their names.
     """
 
@@ -109,12 +111,10 @@ class BagTypes:
             name: The type.
             wanted: Attributes that lead to values, or to messages with all that is in them.
         """
-        try:
-            return PartialDecoder(name, wanted, self._fields).decode
-        except NotImplementedError:
-            return lambda data: self.decode(data, name)
+        return PartialDecoder(name, wanted, self._fields).decode
 
     def _definition(self, name: str) -> MessageType:
+        found: Definitions = {}
         if self._texts.get(name, "").strip():
             found = parse_definitions(name, self._texts[name])
             # What cannot be read of a definition is no other one.
@@ -124,20 +124,30 @@ class BagTypes:
                 if ours is None or (whole and its[1] and not _are_one(its, ours)):
                     self._own.setdefault(kind, its)
         if not is_known(name, self._fields):
+            why = self._why_unknown(name, ChainMap(found, self._fields))
             self._own.pop(name, None)
-            how = self._elsehow.get(name)
-            why = (
-                f"the bag defines it in {how}, which is not read here: record it with a package "
-                "that has .msg files"
-                if how
-                else "the bag does not define it: record it where its package is sourced"
-            )
             raise MessagePathError(f"the type {name} is none of ROS 2 Jazzy, and {why}.")
         constants, fields = self._fields[name]
         return MessageType(
             name,
             tuple(_field(field, its) for field, its in fields if field != FILLER),
             _whole(constants),
+        )
+
+    def _why_unknown(self, name: str, fields: Mapping[str, Any]) -> str:
+        """Why a type is not known, and what helps."""
+        if how := self._elsehow.get(name):
+            return (
+                f"the bag defines it in {how}, which is not read here: record it with a package "
+                "that has .msg files"
+            )
+        missing = sorted(types_within(name, fields) - fields.keys())
+        if any(missing):
+            which = "it" if name in missing else f"{missing[-1]}, which is within it"
+            return f"the bag does not define {which}: record it where its package is sourced"
+        return (
+            "the bag defines it as no type of ROS 2 can be: record it with a package that has .msg "
+            "files"
         )
 
 
@@ -153,7 +163,7 @@ def _shapes(fields: Iterable[tuple[str, Any]]) -> list[tuple[str, Any]]:
         node, about = descriptor
         if node in (Nodetype.ARRAY, Nodetype.SEQUENCE):
             return node, shape(about[0]), about[1] if node == Nodetype.ARRAY else 0
-        return node, about if node == Nodetype.NAME else about[0]
+        return node, about if node == Nodetype.NAME else _BYTES.get(about[0], about[0])
 
     return [(name, shape(its)) for name, its in fields if name != FILLER]
 

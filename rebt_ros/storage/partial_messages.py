@@ -36,6 +36,8 @@ _FIXED: Final[Mapping[str, tuple[str, str]]] = {
     "float32": ("f", "f4"),
     "float64": ("d", "f8"),
 }
+#: From here on, a wide string has whole characters instead of units of UTF-16.
+_LARGEST_UNIT: Final = 0xFFFF
 _ORDERS: Final = {b"\0\1": "<", b"\0\0": ">"}
 _LENGTHS: Final = {order: struct.Struct(f"{order}I") for order in _ORDERS.values()}
 _HEAD: Final = 4
@@ -97,6 +99,27 @@ class _Stretch:
 
 
 @dataclass(frozen=True, slots=True)
+class _WideText:
+    """A wide string: the middleware of ROS 2 has four bytes for each unit of UTF-16, and no end."""
+
+    wanted: bool
+
+    def read(self, data: bytes, place: int, order: str, into: list[Any]) -> int:
+        """See `_Stretch.read`."""
+        place, count = _length(data, place, order)
+        end = place + 4 * count
+        if end + _HEAD > len(data):
+            raise ValueError("a string is longer than its message")
+        if self.wanted:
+            units = np.frombuffer(data, f"{order}u4", count, _HEAD + place if count else 0)
+            if np.any(units > _LARGEST_UNIT):
+                into.append(units.astype("<u4").tobytes().decode("utf-32-le"))
+            else:
+                into.append(units.astype("<u2").tobytes().decode("utf-16-le"))
+        return end
+
+
+@dataclass(frozen=True, slots=True)
 class _Text:
     """A string."""
 
@@ -115,19 +138,23 @@ class _Text:
 
 @dataclass(frozen=True, slots=True)
 class _Texts:
-    """A sequence of strings."""
+    """Strings, in an array of fixed length or a sequence."""
 
+    one: _Text | _WideText
+    count: int | None
+    """None for a sequence."""
     wanted: bool
 
     def read(self, data: bytes, place: int, order: str, into: list[Any]) -> int:
         """See `_Stretch.read`."""
-        place, count = _length(data, place, order)
+        count = self.count
+        if count is None:
+            place, count = _length(data, place, order)
         if count > len(data):
             raise ValueError("a sequence is longer than its message")
         texts: list[Any] = []
-        one = _Text(self.wanted)
         for _ in range(count):
-            place = one.read(data, place, order, texts)
+            place = self.one.read(data, place, order, texts)
         if self.wanted:
             into.append(texts)
         return place
@@ -185,7 +212,7 @@ class _Records:
         return place
 
 
-_Part: TypeAlias = _Stretch | _Text | _Texts | _Numbers | _Records
+_Part: TypeAlias = _Stretch | _Text | _WideText | _Texts | _Numbers | _Records
 
 
 def _length(data: bytes, place: int, order: str) -> tuple[int, int]:
@@ -202,10 +229,6 @@ class PartialDecoder:
         kind: Name of the type.
         wanted: What is asked for.
         definitions: Fields of each type, as rosbags knows them.
-
-    Raises:
-        NotImplementedError: The type has, up to the last wanted field, what is not read here:
-            arrays of strings that have a fixed length, and wide strings.
     """
 
     def __init__(
@@ -243,14 +266,13 @@ class PartialDecoder:
         single = node == Nodetype.BASE
         element = (node, about) if single else about[0]
         name = element[1][0] if element[0] == Nodetype.BASE else ""
-        if name == "string" and node != Nodetype.ARRAY:
-            self._parts.append(_Text(wanted) if single else _Texts(wanted))
+        count = about[1] if node == Nodetype.ARRAY else None
+        if name in ("string", "wstring"):
+            text = _Text(wanted) if name == "string" else _WideText(wanted)
+            self._parts.append(text if single else _Texts(text, count, wanted))
         elif element[0] == Nodetype.NAME:
             inner = PartialDecoder(element[1], [()], self._definitions)
-            count = about[1] if node == Nodetype.ARRAY else None
             self._parts.append(_Records(inner._parts, inner._build, count, wanted))
-        elif name not in _FIXED:
-            raise NotImplementedError(f"{element} is not read here")
         elif node == Nodetype.SEQUENCE:
             code, kind = _FIXED[name]
             kinds = {order: np.dtype(f"{order}{kind}") for order in _ORDERS.values()}

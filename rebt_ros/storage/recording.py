@@ -9,9 +9,10 @@ loses none, and a recording can be read while it grows.  Against a loss of power
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -32,6 +33,12 @@ from rebt_ros.storage.text import unreadable
 #: Follows the name of a recording that is kept, but not learned from.
 ASIDE: Final = ".failed"
 
+#: How a file is opened that no other recorder has; it is read where it was removed.
+_NEW: Final = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+
+#: A file that was removed is copied in parts of this size (bytes).
+_PART: Final = 1 << 20
+
 
 class RecordingError(StorageError):
     """A recording cannot be written; what was acknowledged before is on disk."""
@@ -48,6 +55,7 @@ class RecordingWriter:
         origin: Why it was shown.
         robot: Where the features are in messages; None where they are arrays of numbers.
         categories: Those of the features by name, where there is a robot file; may grow.
+        told: Told in a sentence that the file was removed while it was written, and is there again.
 
     Raises:
         RecordingError: The file cannot be created.
@@ -68,6 +76,7 @@ class RecordingWriter:
         origin: Origin = Origin.DEMONSTRATION,
         robot: RobotFile | None = None,
         categories: Mapping[str, Categories] | None = None,
+        told: Callable[[str], object] = lambda _: None,
     ) -> None:
         if not features:
             raise ValueError("a recording needs at least one feature")
@@ -75,6 +84,7 @@ class RecordingWriter:
         self._width = len(features)
         self._channels = frozenset(channels)
         self._may_miss = robot is not None
+        self._told = told
         texts = {
             place: (categories or {})[feature.name]
             for place, feature in enumerate(features)
@@ -128,6 +138,18 @@ class RecordingWriter:
             raise
         self.rows += 1
 
+    def look(self) -> None:
+        """Writes the file again where it was removed, and notices where it was moved.
+
+        Raises:
+            RecordingError: It was moved, or could not be written again.
+        """
+        if self._descriptor is None or self._is_there():
+            return
+        if os.fstat(self._descriptor).st_nlink:
+            raise self._moved()
+        self._write_again()
+
     def sync(self) -> None:
         """Makes the rows written so far survive a loss of power; takes as long as the disk does.
 
@@ -148,7 +170,7 @@ class RecordingWriter:
         """Ends the recording; one without rows is removed.
 
         Raises:
-            RecordingError: The disk refused to keep what was written.
+            RecordingError: The disk refused to keep what was written, or the file was moved.
         """
         if self._descriptor is None:
             return
@@ -156,12 +178,8 @@ class RecordingWriter:
             self.discard()
             return
         try:
+            self.look()
             self.sync()
-            if not self._is_there():
-                raise RecordingError(
-                    f"{self.path} was moved or removed while it was written: its {self.rows} rows "
-                    "are not there."
-                )
         finally:
             descriptor, self._descriptor = self._descriptor, None
             with contextlib.suppress(OSError):
@@ -193,12 +211,17 @@ class RecordingWriter:
         Raises:
             RecordingError: The file cannot be removed.
         """
+        moved = None
+        if self._descriptor is not None and self.rows and not self._is_there():
+            moved = self._moved() if os.fstat(self._descriptor).st_nlink else None
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             with contextlib.suppress(OSError):
                 os.close(descriptor)
+        if moved is not None:
+            raise moved
         try:
-            self.path.unlink(missing_ok=True)
+            self.path.unlink(missing_ok=descriptor is not None)
         except OSError as err:
             raise RecordingError(
                 f"{self.path} cannot be removed ({err.strerror or err}): remove it by hand."
@@ -220,8 +243,49 @@ class RecordingWriter:
         assert self._descriptor is not None
         try:
             return os.path.samestat(self.path.stat(), os.fstat(self._descriptor))
-        except OSError:
+        except (FileNotFoundError, NotADirectoryError):
             return False
+        except OSError:
+            # Who may not look does not know better.
+            return True
+
+    def _moved(self) -> RecordingError:
+        place = Path(f"/proc/self/fd/{self._descriptor}")
+        with contextlib.suppress(OSError):
+            place = place.readlink()
+        elsewhere = "where it was moved to" if place in (self.path, self.path.resolve()) else place
+        return RecordingError(
+            f"{self.path} was moved while it was written: its {self.rows} rows are in {elsewhere}."
+        )
+
+    def _write_again(self) -> None:
+        """Copies what is in the file, which has no name any more, to one that has."""
+        assert self._descriptor is not None
+        removed, made = self.path, None
+        try:
+            removed.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                path, made = removed, os.open(removed, _NEW, 0o666)
+            except FileExistsError:
+                path, made = _create(removed.parent)
+            for place in range(0, self._size, _PART):
+                part = os.pread(self._descriptor, min(_PART, self._size - place), place)
+                if os.write(made, part) < len(part):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as err:
+            if made is not None:
+                os.close(made)
+                with contextlib.suppress(OSError):
+                    path.unlink()
+            raise RecordingError(
+                f"{removed} was removed while it was written, and cannot be written again "
+                f"({err.strerror or err}): its {self.rows} rows are lost."
+            ) from err
+        os.close(self._descriptor)
+        self.path, self._descriptor, self._named = path, made, False
+        self._told(
+            f"{removed} was removed while it was written: its {self.rows} rows are in {path} again."
+        )
 
     def _append(self, content: bytes) -> None:
         if self._descriptor is None:
@@ -229,9 +293,8 @@ class RecordingWriter:
         try:
             status = os.fstat(self._descriptor)
             if status.st_nlink == 0:
-                raise RecordingError(
-                    f"{self.path} was removed while it was written: start a new demonstration."
-                )
+                self._write_again()
+                status = os.fstat(self._descriptor)
             # A part of a row that an earlier failure left could not be cut off: try again first.
             if status.st_size > self._size:
                 os.ftruncate(self._descriptor, self._size)
@@ -278,5 +341,4 @@ def _create(directory: Path) -> tuple[Path, int]:
         name = f"{now:%Y%m%dT%H%M%S.%fZ}-{os.getpid()}-{secrets.token_hex(3)}{SUFFIX}"
         path = directory / name
         with contextlib.suppress(FileExistsError):
-            flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-            return path, os.open(path, flags, 0o666)
+            return path, os.open(path, _NEW, 0o666)

@@ -25,7 +25,7 @@ def recordings(directory: Path) -> tuple[Path, ...]:
     """
     found = tuple(file for file in _named_so(directory) if is_recording(file))
     if not found:
-        why = "".join(f" ({note})" for note in no_recordings(directory))
+        why = "".join(f" ({note})" for note in no_recordings(directory) or _others(directory))
         raise InputError(f"{directory} holds no recordings{why}: record a demonstration first.")
     return found
 
@@ -45,6 +45,14 @@ def no_recordings(directory: Path) -> tuple[str, ...]:
         return (f"{others[0]} does not begin like a recording and is left out",)
     count = len(others)
     return (f"{count} files do not begin like recordings and are left out: {listing(others)}",)
+
+
+def _others(directory: Path) -> tuple[str, ...]:
+    """What there is instead of recordings, in words if there is any."""
+    others = sorted(one.name for one in directory.iterdir() if not one.name.startswith("."))
+    if not others:
+        return ()
+    return (f"{listing(others)} is none; the command `learn` reads tables and bags",)
 
 
 def is_named_so(path: Path) -> bool:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from unicodedata import is_normalized, normalize
 
 from rebt_ros.errors import InputError
 from rebt_ros.storage.cells import is_number
@@ -60,11 +61,31 @@ class Records:
 #: Stands between two files that were put one behind the other.
 _BYTE_ORDER_MARK = "\ufeff"
 
+#: What ends lines in few files only, and characters that take no room.
+_OTHER_ENDS = ("\u2028", "\u2029", "\x85")
+_UNSEEN = ("\u200b", "\u200e", "\u200f", "\u2060")
+
 #: How JSON begins that holds objects.
 _JSON = ("{", "[{")
 
 #: Longest cell (characters): that of a scan or an image as text has some millions.
 _LONGEST_CELL = 1 << 30
+
+
+def _usual(text: str, notes: list[str]) -> str:
+    """Text with usual ends of lines, without what nobody sees; notes what was done."""
+    if text.isascii():
+        return text
+    if "\n" not in text and "\r" not in text and any(end in text for end in _OTHER_ENDS):
+        for end in _OTHER_ENDS:
+            text = text.replace(end, "\n")
+    if any(one in text for one in _UNSEEN):
+        text = text.translate(dict.fromkeys(map(ord, _UNSEEN)))
+        notes.append("characters that nobody sees, such as U+200B, are left out")
+    if not is_normalized("NFC", text):
+        text = normalize("NFC", text)
+        notes.append("letters that are written as two characters, with their accents, are one")
+    return text
 
 
 def read_records(path: Path) -> Records:
@@ -73,15 +94,15 @@ def read_records(path: Path) -> Records:
     Raises:
         InputError: The file cannot be read, or holds no table.
     """
-    encoding: list[str] = []
+    said: list[str] = []
 
     def windows(data: bytes) -> str | None:
         text = windows_text(data)
         if text is not None:
-            encoding.append("it is not UTF-8, and read as Windows-1252: check its letters")
+            said.append("it is not UTF-8, and read as Windows-1252: check its letters")
         return text
 
-    text = read_text(path, windows).replace(_BYTE_ORDER_MARK, "")
+    text = _usual(read_text(path, windows).replace(_BYTE_ORDER_MARK, ""), said)
     if text.lstrip().startswith("<"):
         raise InputError(
             f"{path} is HTML or XML, and no table: save the table itself as CSV, or download the "
@@ -113,7 +134,7 @@ def read_records(path: Path) -> Records:
         # In Markdown, lines also begin with what separates cells.
         rows = [cells[1:] for cells in rows]
     rows = _without_blank_ends(rows)
-    notes = (*encoding, *dialect.notes)
+    notes = (*said, *dialect.notes)
     if cut := _cut_off(text, rows):
         notes += (cut,)
     if _lacks_a_name(rows):

@@ -181,10 +181,7 @@ class _RobotFeed(Feed):
             message = decode(data)
         except Exception as err:  # whatever the generated decoders meet
             check_encapsulation(data)
-            why = ""
-            if isinstance(err, NotImplementedError):
-                why = " (it has wide strings, or arrays of strings, which are not read here)"
-            raise UndecodableError(why) from err
+            raise UndecodableError from err
         rows: list[Row] = []
         refused: BadMessageError | None = None
         # What is done follows from what was there before this message.

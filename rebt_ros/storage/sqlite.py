@@ -81,14 +81,14 @@ class SqliteFile:
         return sum(count for number, count in self.found.items() if number not in known)
 
     def definitions(self) -> list[tuple[str, str]]:
-        """Types with their definitions as `.msg` files have them, if those can be read."""
+        """Types with their definitions, those of `.msg` or `.idl` files, if they can be read."""
         with (
             contextlib.suppress(sqlite3.Error),
             contextlib.closing(_connected(self.path)) as connection,
         ):
             found = connection.execute(
                 "SELECT topic_type, encoded_message_definition FROM message_definitions "
-                "WHERE encoding = 'ros2msg' LIMIT 1000"
+                "WHERE encoding IN ('ros2msg', 'ros2idl') LIMIT 1000"
             ).fetchall()
             return [
                 (kind, text)

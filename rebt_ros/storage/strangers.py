@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -37,6 +38,8 @@ PACKED_ARCHIVES: Final = (
     *(".tgz", ".tbz", ".tbz2", ".txz"),
 )
 _UNTAR: Final = "unpack it with `tar -xf`"
+
+_ARFF: Final = re.compile(rb"(?:\s|%[^\n]*\n)*@relation\s", re.IGNORECASE)
 
 #: How files begin that are no files of messages, what they are, and what helps.
 _STRANGERS: Final[Sequence[tuple[bytes, str]]] = (
@@ -90,6 +93,11 @@ def _what_it_is(path: Path, begin: bytes) -> str:
             if path.name.lower().endswith(PACKED_ARCHIVES):
                 return f"is a packed tar archive: {_UNTAR}"
             return f"is packed with {how}: unpack it with `{unpack}`"
+    if _ARFF.match(begin):
+        return (
+            "is an ARFF file of Weka: write it as CSV, or keep the lines behind @data, below a "
+            "line of names"
+        )
     return next((what for magic, what in _STRANGERS if begin.startswith(magic)), "")
 
 

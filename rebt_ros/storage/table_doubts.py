@@ -54,8 +54,23 @@ def actions_again(
 
 def _is_called_after(name: str, label: str) -> bool:
     plain = name.strip().lower()
-    stems = {"action", label.strip().lower()}
+    stems = {"action", "label", label.strip().lower()}
     return any(plain.startswith(one) and _AGAIN.fullmatch(plain[len(one) :]) for one in stems)
+
+
+def same_words(columns: Mapping[str, Sequence[str]], actions: Sequence[str]) -> Iterator[str]:
+    """Notes features that hold the action of each row in the same words.
+
+    Args:
+        columns: Cells by the names of the features.
+        actions: The action of each row.
+    """
+    for name, cells in columns.items():
+        if all(cell.strip() == action for cell, action in zip(cells, actions, strict=True)):
+            yield (
+                f"column {name!r} holds the action of each row, word for word: leave it out of the "
+                "table if it is known only with the action"
+            )
 
 
 def of_features(names: Sequence[str]) -> Iterator[str]:

@@ -19,18 +19,20 @@ from hypothesis import strategies as st
 import rebt_ros
 from rebt_ros.behavior_tree import nodes, paths
 from rebt_ros.behavior_tree.document import dumps, loads
-from rebt_ros.behavior_tree.learned_tree import Root
+from rebt_ros.behavior_tree.learned_tree import Figures, Root
 from rebt_ros.commands.revise import main as revise_command
 from rebt_ros.demonstration.demonstration import Demonstration, Row, RowKind
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import tabulate
 from rebt_ros.errors import InputError, OptionError, RebtError
 from rebt_ros.export.btcpp import to_btcpp
-from rebt_ros.learning import evaluation
+from rebt_ros.learning import evaluation, pipeline
 from rebt_ros.learning.learning import Learning
 from rebt_ros.learning.learning_file import Saved, load_learning, restored, saved, write_learning
 from rebt_ros.learning.options import LearnOptions, PsaChoice, Use
-from rebt_ros.learning.pipeline import learn_from
+from rebt_ros.learning.pipeline import learn_from, summary_sentence
+from rebt_ros.offline import level_files, result
+from rebt_ros.storage.atomic import StorageError, write_text_atomically
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 
@@ -183,6 +185,38 @@ def test_an_edited_tree_is_saved_as_it_is() -> None:
         mine.edited(lambda tree: nodes.Action("fly", "action"))
 
 
+def _figures(learning: Learning) -> Figures:
+    return loads(dumps(learning.learned)).provenance.figures
+
+
+def test_a_tree_that_does_something_else_claims_no_figures_of_the_tree_before() -> None:
+    mine = again(learned())
+    before = _figures(mine)
+    assert before.own_history_agreement is not None
+    removed = mine.edited(lambda tree: paths.removed(tree, (0,)))
+    attached = mine.with_attached("all")
+    for changed in (removed, attached, attached.edited(lambda tree: paths.removed(tree, (1,)))):
+        assert _figures(changed) == Figures(None, None, None, before.held_out_rows)
+        assert "what was attached or edited changes what it does" in (
+            summary_sentence(changed.learned)
+        )
+        assert _figures(again(changed)) == _figures(changed)
+    assert pipeline._pooled([before, _figures(removed)]) == (
+        Figures(None, None, None, 2 * before.held_out_rows)
+    )
+    unjudged = Figures(0, None, None, 0)
+    assert pipeline._pooled([before, unjudged]) == before
+    assert _figures(attached.without("all")) == before
+    assert _figures(attached.level(1)).own_history_agreement is not None
+
+
+def test_a_tree_that_does_the_same_keeps_its_figures() -> None:
+    mine = again(learned())
+    same = mine.edited(lambda tree: nodes.Selector((*nodes.children(tree), *nodes.children(tree))))
+    assert same.learned.tree != mine.learned.tree
+    assert _figures(same) == _figures(mine)
+
+
 @pytest.mark.skipif(not SHARED.exists(), reason="third-party data is not beside the checkout")
 def test_all_verbs_take_less_time_than_learning_and_fit_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -333,6 +367,33 @@ def test_revise_lists_what_can_be_changed_and_changes_it(
     with pytest.raises(SystemExit):
         revise(capsys, tmp_path, "--level", "999")
     assert capsys.readouterr().err.startswith("revise: there is no pruning level 999")
+
+
+@pytest.mark.parametrize("fails", ["tree.dot", "summary.json"])
+def test_where_not_all_files_can_be_written_none_is_of_a_tree_before(
+    fails: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def write(path: Path, text: str) -> None:
+        if path.name == fails:
+            raise StorageError(f"{path} cannot be written.")
+        write_text_atomically(path, text)
+
+    table, out = tmp_path / "table.csv", tmp_path / "out"
+
+    def files(at: int) -> dict[str, bytes]:
+        """What there is after learning to stop from a state on."""
+        rows = (f"{t % 10},{'go' if t % 10 < at else 'stop'}\n" for t in range(60))
+        table.write_text("x,label\n" + "".join(rows))
+        with contextlib.suppress(StorageError):
+            rebt_ros.learn(table, out=out)
+        return {one.name: one.read_bytes() for one in out.iterdir()}
+
+    before = files(3)
+    for module in (level_files, result):
+        monkeypatch.setattr(module, "write_text_atomically", write)
+    left = files(6)
+    assert {"tree.json", "tree.svg", "learning.npz"} <= left.keys() < before.keys()
+    assert not [name for name, data in left.items() if data == before[name]]
 
 
 @pytest.mark.usefixtures("matplotlib_is_missing")

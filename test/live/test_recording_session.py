@@ -21,6 +21,7 @@ class Disk:
     def __init__(self) -> None:
         self.files: list[File] = []
         self.full = False
+        self.moved = False
         self.syncs = 0
 
     def open(self, features: tuple[Feature, ...], origin: Origin) -> File:
@@ -49,6 +50,10 @@ class File:
     def write(self, row: Row) -> None:
         self._disk.check()
         self.written.append(row)
+
+    def look(self) -> None:
+        if self._disk.moved:
+            raise RebtError("it was moved.")
 
     def sync(self) -> None:
         self._disk.check()
@@ -241,6 +246,26 @@ def test_a_disk_that_does_not_keep_its_rows_ends_a_demonstration() -> None:
     desk.disk.full = False
     desk.session.act(5, "action", "turn")
     assert desk.session.failure == ""
+    assert desk.rows() == [[("go", None, (1.0,))], [("turn", None, (1.0,))]]
+
+
+def test_a_file_that_was_moved_ends_a_demonstration_and_the_next_action_begins_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(recording_session, "_RETRY_AFTER", 100.0)
+    desk = Desk()
+    desk.session.look(0)
+    desk.session.start(0)
+    desk.session.look(0)
+    desk.session.observe(1, "state", [1.0], [])
+    desk.session.act(2, "action", "go")
+    desk.session.look(3)
+    assert (desk.faults, desk.session.failure) == ([], "")
+    desk.disk.moved = True
+    desk.session.look(3)
+    assert (desk.faults, desk.session.failure) == (["write error"], "it was moved.")
+    desk.session.act(4, "action", "turn")
+    assert (desk.session.rows, desk.session.lost, desk.session.failure) == (2, 0, "")
     assert desk.rows() == [[("go", None, (1.0,))], [("turn", None, (1.0,))]]
 
 

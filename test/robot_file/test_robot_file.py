@@ -36,13 +36,25 @@ STATE = "state: {x: /odom.pose.pose.position.x}\n"
 
 WRONG = [
     ("", "it is empty: it needs a part 'state'"),
-    ("state:", "line 1: state must be a map, not None"),
+    ("state:", "line 1: state must be a map, of names and what they stand for, not None"),
+    ("state:\n\tx: /odom.x", "cannot start any token): indent with blanks, not with tabs"),
+    ("state:\n  x: @abs", "cannot start any token): quote what begins with @"),
+    ("state: {x: {path: /odom.x, categories: a}}", "categories must be a list or a map, not 'a'"),
+    (f"{STATE}actions: {{a: 5}}", "position.x, or a map, not 5"),
+    (f"{STATE}topics: {{/odom: []}}", "topics./odom must be a message type or a map, not []"),
+    (
+        f"{STATE}actions: {{a: {{twist: /t, sectors: {{f: -90, g: 270}}}}}}",
+        "sectors have f and g in the same direction, so that g is never done",
+    ),
     ("state: {}", "line 1: state names no feature"),
     ("actions: {}", "needs a part 'state' that names the features"),
-    ("- state", "line 1: it must be a map, not ['state']"),
+    ("- state", "line 1: it must be a map, of names and what they stand for, not ['state']"),
     ("state: {x: /odom.x", "line 1: this is not YAML"),
     ("state: {x: /odom.}", "line 1: state.x is wrong, as message path '/odom.' ends where"),
-    ("state:\n  x: 3", "line 2: state.x must be a map, not 3"),
+    (
+        "state:\n  x: 3",
+        "line 2: state.x must be a message path, such as /odom.pose.pose.position.x",
+    ),
     ("state:\n  x:\n    paht: /a.b", "line 3: state.x.paht is unknown here; known are path"),
     ("state:\n  x:\n    kind: binary", "line 2: state.x needs a 'path'"),
     (
@@ -185,6 +197,7 @@ _BEYOND_THE_SCHEMA = (
     "use.",
     "twice",
     "second threshold",
+    "same direction",
     "its kind is",
 )
 

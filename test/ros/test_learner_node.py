@@ -7,6 +7,7 @@ import json
 import os
 import random
 import resource
+import shutil
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -203,7 +204,10 @@ def test_bad_demonstrations_keep_the_tree_before(domain: int, peer: Peer, tmp_pa
     with NodeProcess("learner_node", domain, tmp_path):
         trees = peer.listen(String, "behavior_tree", LATCHED)
         absent = peer.call("/learner/relearn")
-        assert (absent.success, "demonstrations" in absent.message) == (False, True)
+        assert (absent.success, str(tmp_path / "demonstrations") in absent.message) == (
+            False,
+            True,
+        )
         (tmp_path / "demonstrations").mkdir()
         empty = peer.call("/learner/relearn")
         assert (empty.success, "holds no recordings" in empty.message) == (False, True)
@@ -501,6 +505,55 @@ def test_the_tree_before_is_published_again_on_request(
         drawn = (tmp_path / "learned" / "tree.svg").read_text(encoding="utf-8")
         assert drawn == render_svg(loads(heard[0].data))
         assert not peer.call("/learner/rollback").success
+
+
+def test_what_is_no_recording_is_named_and_a_tree_that_was_removed_is_missed(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    (tmp_path / "demonstrations").mkdir()
+    (tmp_path / "demonstrations" / "table.csv").write_text("x,label\n1,go\n2,stop\n")
+    with NodeProcess("learner_node", domain, tmp_path):
+        answer = peer.call("/learner/relearn")
+        assert not answer.success
+        assert "table.csv is none; the command `learn` reads tables and bags" in answer.message
+        _record(tmp_path / "demonstrations")
+        answer = peer.call("/learner/relearn")
+        assert answer.success
+        assert "table.csv" in answer.message
+        assert _status(peer, "It is published").level == DiagnosticStatus.OK
+        shutil.rmtree(tmp_path / "learned")
+        missed = _status(peer, f"is not in {tmp_path / 'learned' / 'tree.json'}, and is gone once")
+        assert missed.level == DiagnosticStatus.WARN
+
+
+def test_a_full_disk_publishes_nothing_and_is_told_of(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    _record(tmp_path / "demonstrations")
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
+        heard = peer.listen(String, "behavior_tree", LATCHED)
+        for rows in (60, 80):
+            _record(tmp_path / "demonstrations", rows, ("go", "stop"))
+            assert peer.call("/learner/relearn").success
+        _latest(peer, heard, 2)
+        pid = learner.process.pid
+        _, most = resource.prlimit(pid, resource.RLIMIT_FSIZE)
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (100, most))
+        for service in ("relearn", "rollback"):
+            answer = peer.call(f"/learner/{service}")
+            assert not answer.success
+            assert (
+                "tree.json cannot be written" in answer.message or "000003.json" in answer.message
+            )
+            status = peer.wait_until(peer.anew("learner: learning"))
+            assert (status.level, answer.message in status.message) == (
+                DiagnosticStatus.WARN,
+                True,
+            )
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (most, most))
+        assert peer.call("/learner/rollback").success
+        _latest(peer, heard, 3)
+        assert heard[2].data == heard[0].data
 
 
 @pytest.mark.parametrize("broken", ["{", None])

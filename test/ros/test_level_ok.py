@@ -51,6 +51,26 @@ def test_a_recorder_says_whose_qos_does_not_fit(domain: int, peer: Peer, tmp_pat
         assert "Not heard so far: action" in answer.message
 
 
+def test_what_helps_against_states_of_best_effort_was_tried(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    publisher = peer.node.create_publisher(Float64MultiArray, "state", BEST_EFFORT)
+    with NodeProcess("recorder_node", domain, tmp_path, PROMPT):
+        _warns(
+            peer, "recorder", "offers incompatible QoS on /state", "set state_qos to sensor_data"
+        )
+    with NodeProcess("recorder_node", domain, tmp_path, {**PROMPT, "state_qos": "sensor_data"}):
+        peer.diagnostics.clear()
+
+        def recorded() -> bool:
+            publisher.publish(Float64MultiArray(data=[1.0]))
+            peer.action("go")
+            status = peer.diagnostics.get("recorder: recording")
+            return status is not None and int(values_of(status)["rows"]) > 0
+
+        peer.wait_until(recorded)
+
+
 def test_a_recorder_says_who_publishes_another_type(
     domain: int, peer: Peer, tmp_path: Path
 ) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import random
 import resource
+import shutil
 import signal
 from pathlib import Path
 
@@ -120,6 +121,36 @@ def test_a_full_disk_is_an_error_until_there_is_room(
     assert len(first.demonstration) == 10
     assert last.demonstration.actions[-1] in ("last", "refused")
     assert len(recordings(directory)) == len(list(directory.iterdir()))
+
+
+def test_a_directory_that_is_moved_or_removed_while_it_is_written_to_costs_no_row(
+    domain: int, peer: Peer, tmp_path: Path
+) -> None:
+    directory, moved = tmp_path / "demonstrations", tmp_path / "moved"
+
+    def says(what: str) -> bool:
+        status = peer.diagnostics[RECORDER]
+        return status.level != b"\0" and what in status.message
+
+    def rows() -> int:
+        return int(values_of(peer.diagnostics[RECORDER])["rows"])
+
+    with NodeProcess("recorder_node", domain, tmp_path) as recorder:
+        peer.state(0.5)
+        peer.action("first")
+        peer.wait_until(lambda: RECORDER in peer.diagnostics and rows() == 1)
+        directory.rename(moved)
+        peer.wait_until(lambda: says(f"was moved while it was written: its 1 rows are in {moved}"))
+        peer.action("second")
+        peer.wait_until(lambda: rows() == 2)
+        shutil.rmtree(directory)
+        peer.wait_until(lambda: says("was removed while it was written: its 1 rows are in"))
+        peer.action("third")
+        peer.wait_until(lambda: rows() == 3)
+        assert recorder.stop() == 0
+    ((first,), (second,)) = (recordings(one) for one in (moved, directory))
+    assert read_recording(first).demonstration.actions == ("first",)
+    assert read_recording(second).demonstration.actions == ("second", "third")
 
 
 def test_lost_messages_are_counted_and_warned_of(domain: int, peer: Peer, tmp_path: Path) -> None:

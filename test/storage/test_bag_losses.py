@@ -276,6 +276,41 @@ def test_after_a_damaged_chunk_the_next_ones_are_read_and_no_state_is_made_up(
     assert (read.account.stated, read.account.read) == (40, 34)
 
 
+@pytest.mark.parametrize("finished", [False, True])
+def test_records_of_kinds_that_come_later_are_passed_over_with_a_note(
+    tmp_path: Path, *, finished: bool
+) -> None:
+    added = mcap.record(0x10, b"new!") + mcap.record(0x7F, b"")
+    messages = mcap.demonstration()
+    mcap.write(tmp_path / "bag.mcap", messages, finished=finished, added=added)
+    read = read_bag(tmp_path / "bag.mcap")
+    assert len(read.demonstration) == 20
+    [note] = (one for one in read.notes if "of its format" in one)
+    count = 10 if finished else 8
+    assert f"{count} records are of kinds that are not known (0x10, 0x7f), and passed over" in note
+
+
+def test_records_of_a_programs_own_are_passed_over(tmp_path: Path) -> None:
+    added = mcap.record(0x80, b"new!") + mcap.record(0xFF, b"")
+    read = read_bag(mcap.write(tmp_path / "bag.mcap", mcap.demonstration(), added=added))
+    assert (len(read.demonstration), read.notes) == (20, ())
+
+
+def test_a_chunk_that_is_called_something_else_is_missing(tmp_path: Path) -> None:
+    path = mcap.write(tmp_path / "bag.mcap", mcap.demonstration(), per_chunk=5)
+    with path.open("rb") as file:
+        begins = [start - 9 for kind, start, _ in _records(file) if kind == 6]
+    data = bytearray(path.read_bytes())
+    data[begins[2]] ^= 0x40
+    path.write_bytes(data)
+    read = read_bag(path)
+    assert len(read.demonstration) == 17
+    assert any("later version of its format, or damaged: 1 record is" in n for n in read.notes)
+    assert "left out: 1 action after messages that are missing, whose state is not known" in (
+        read.notes
+    )
+
+
 def test_no_action_is_sampled_through_missing_messages(tmp_path: Path) -> None:
     messages = [replace(one, stamp=one.stamp * 100_000_000) for one in mcap.demonstration()]
     path = mcap.write(tmp_path / "bag.mcap", messages, per_chunk=4)

@@ -145,7 +145,7 @@ def test_columns_that_number_or_date_the_rows_are_features_only_if_asked_for(tab
     assert asked.notes == ()
 
 
-@pytest.mark.parametrize("cell", ["1_000", "١"])
+@pytest.mark.parametrize("cell", ["1_000", "²"])
 def test_only_what_every_tool_reads_as_a_number_is_one(table, cell):
     shown = read_csv(table(f"x,a\n{cell},go\n{cell},turn\n")).demonstration
     assert shown.features[0].categories == (cell,)

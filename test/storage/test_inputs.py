@@ -112,6 +112,7 @@ def test_a_directory_of_bags_is_each_of_them_and_so_is_one_of_tables(tmp_path):
         (b"#ROSBAG V2.0\n\xff", "rosbags-convert --src"),
         (b"PAR1\x15\0", "Parquet"),
         (b"\x89HDF\r\n", "HDF5"),
+        (b"% of 2024\n\n@RELATION arm\n@attribute x numeric\n", "ARFF file of Weka"),
         (b"\xd0\xcf\x11\xe0\xa1", "old Excel"),
         (b"BZh91AY", "bunzip2"),
         (b"\x28\xb5\x2f\xfd\x04", "unzstd"),

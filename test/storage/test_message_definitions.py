@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ from rebt_ros.errors import InputError, MessagePathError
 from rebt_ros.robot_file.errors import RobotFileError
 from rebt_ros.robot_file.reading import parse_robot_file
 from rebt_ros.storage.bag_survey import survey_bag
+from rebt_ros.storage.idl import parse_idl
 from rebt_ros.storage.message_definitions import parse_definitions
-from rebt_ros.storage.message_types import BagTypes
+from rebt_ros.storage.message_types import BagTypes, _shapes, _whole
 from rebt_ros.storage.robot_bag import read_robot_bag
 
 OWN = """\
@@ -48,7 +50,7 @@ actions:
 """
 
 
-def _write(path: Path, plugin: StoragePlugin) -> Path:
+def _write(path: Path, plugin: StoragePlugin, defined: Mapping[str, str] | None = None) -> Path:
     types = get_typestore(Stores.ROS2_JAZZY)
     types.register(get_types_from_msg(JOINT, "my_msgs/msg/Joint"))
     types.register(get_types_from_msg(OWN, "my_msgs/msg/Own"))
@@ -56,7 +58,8 @@ def _write(path: Path, plugin: StoragePlugin) -> Path:
     stamp = kinds["builtin_interfaces/msg/Time"](sec=1, nanosec=0)
     header = kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="base")
     with Writer(path, version=9, storage_plugin=plugin) as writer:
-        to = writer.add_connection("/arm", "my_msgs/msg/Own", typestore=types)
+        about: Mapping[str, Any] = defined or {"typestore": types}
+        to = writer.add_connection("/arm", "my_msgs/msg/Own", **about)
         for number in range(6):
             joints = [
                 kinds["my_msgs/msg/Joint"](angle=angle, locked=False)
@@ -105,21 +108,17 @@ def test_a_definition_is_its_fields_and_whole_constants() -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
+    ("text", "why"),
     [
-        "",
-        "my_msgs/Missing one",
-        "Own itself",
-        f"Other other\n{'=' * 80}\nMSG: my_msgs/Other\nOwn own",
+        ("", "does not define it: record it where its package is sourced"),
+        ("my_msgs/Missing one", "does not define my_msgs/msg/Missing, which is within it: record"),
+        ("Own itself", "defines it as no type of ROS 2 can be"),
+        (f"Other other\n{'=' * 80}\nMSG: my_msgs/Other\nOwn own", "defines it as no type"),
     ],
 )
-def test_a_type_that_is_empty_not_whole_or_holds_itself_is_unknown(text: str) -> None:
+def test_a_type_that_is_empty_not_whole_or_holds_itself_is_unknown(text: str, why: str) -> None:
     types = BagTypes({"my_msgs/msg/Own": text})
-    if not text:
-        with pytest.raises(MessagePathError, match="record it where its package is sourced"):
-            types("my_msgs/msg/Own")
-        return
-    with pytest.raises(MessagePathError, match="the bag does not define it"):
+    with pytest.raises(MessagePathError, match=f"the bag {why}"):
         types("my_msgs/msg/Own")
 
 
@@ -166,8 +165,8 @@ def test_a_type_that_changed_within_a_bag_is_not_misread(tmp_path: Path, comment
 
 
 def test_how_a_bag_defines_what_is_not_read_is_said(tmp_path: Path) -> None:
-    bag = _points(tmp_path / "bag.mcap", ["module my_msgs {};"], "ros2idl")
-    with pytest.raises(RobotFileError, match="the bag defines it in ros2idl, which is not read"):
+    bag = _points(tmp_path / "bag.mcap", ["{}"], "jsonschema")
+    with pytest.raises(RobotFileError, match="the bag defines it in jsonschema, which is not read"):
         read_robot_bag(bag, OF_X)
 
 
@@ -179,8 +178,8 @@ def test_why_a_message_of_a_robot_cannot_be_decoded_is_said(tmp_path: Path) -> N
     data = b"\0\1\0\0" + struct.pack("<Ixxxxd", 0, 1.0)
     action = mcap.Message(1, 2, mcap.action("go"))
     path = mcap.write(tmp_path / "bag.mcap", [mcap.Message(0, 1, data), action], channels)
-    with pytest.raises(InputError, match="it has wide strings"):
-        read_robot_bag(path, OF_X)
+    [state] = read_robot_bag(path, OF_X).demonstration.states.tolist()
+    assert state == [1.0]
     other = mcap.Message(0, 1, b"\0\7" + data[2:])
     path = mcap.write(tmp_path / "bag.mcap", [other, action], channels)
     with pytest.raises(InputError, match="it begins with 0007"):
@@ -217,6 +216,123 @@ def test_labels_of_values_that_are_never_there_are_refused(
     )
     with pytest.raises(RobotFileError, match="is never 'yes': it is true or false"):
         read_robot_bag(bag, parse_robot_file(text))
+
+
+IDL = f"""{"=" * 80}
+IDL: my_msgs/msg/Own
+// It's "made" by a person /* without .msg
+#include "my_msgs/msg/Joint.idl"
+module my_msgs {{ module msg {{
+  const long SIZE = 3;
+  typedef sequence<my_msgs::msg::Joint, SIZE> Joints;
+  typedef float place_t[SIZE];
+  enum Color {{ RED, GREEN }};
+  module Own_Constants {{
+    const uint8 MODE_IDLE = 0; const octet MODE_BUSY = 0x1;
+    @verbatim (language="comment", text="no ; and no }} )")
+    const string TITLE = "arm; }} # 1";
+  }};
+  /* struct Other {{ double x; }}; */
+  @verbatim (language="comment", text= "An arm." "\\n" "It has \\"joints\\" (some).")
+  struct Own {{
+    std_msgs::msg::Header header;
+    @default (value=1) @unit("none") octet mode;
+    place_t place;
+    Joints joints;
+    @key string<10> name;
+  }};
+}}; }};
+{"=" * 80}
+IDL: my_msgs/msg/Joint
+module my_msgs {{
+  module msg {{
+    struct Joint {{ double angle; boolean locked; }};
+  }};
+}};
+"""
+
+
+@pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_a_type_that_the_bag_defines_in_idl_is_read_as_that_of_msg_files(
+    tmp_path: Path, plugin: StoragePlugin
+) -> None:
+    def shapes(text: str) -> list[Any]:
+        found = parse_definitions("my_msgs/msg/Own", text)
+        return [
+            (_shapes(found[one][1]), _whole(found[one][0]))
+            for one in ("my_msgs/msg/Own", "my_msgs/msg/Joint")
+        ]
+
+    assert shapes(IDL) == shapes(f"{OWN}{'=' * 80}\nMSG: my_msgs/Joint\n{JOINT}")
+    expected = read_robot_bag(_write(tmp_path / "msg", plugin), parse_robot_file(TEXT))
+    bag = _write(tmp_path / "idl", plugin, {"msgdef": IDL, "rihs01": "RIHS01_0"})
+    assert b"IDL: my_msgs" in b"".join(one.read_bytes() for one in bag.iterdir())
+    read = read_robot_bag(bag, parse_robot_file(TEXT))
+    assert read.demonstration.features == expected.demonstration.features
+    assert read.demonstration.states.tolist() == expected.demonstration.states.tolist()
+    assert read.notes == expected.notes
+
+
+def test_the_types_of_ros_are_the_same_in_idl() -> None:
+    share = Path(pytest.importorskip("std_msgs").__file__)
+    found = [one for up in share.parents for one in sorted(up.glob("share/*/msg/*.idl"))]
+    if not found:
+        pytest.skip("the definitions are not installed")
+    for idl in found:
+        name = f"{idl.parts[-3]}/msg/{idl.stem}"
+        text = idl.with_suffix(".msg").read_text(encoding="utf-8")
+        [(own, its)] = parse_idl(idl.read_text(encoding="utf-8")).items()
+        assert own == name
+        constants, fields = parse_definitions(name, text)[name]
+        assert _whole(its[0]) == _whole(constants), name
+        assert _shapes(its[1]) == _shapes(fields), name
+
+
+@pytest.mark.parametrize(
+    "struct",
+    [
+        "struct Own { double grid[2][3]; };",
+        "struct Own { sequence<sequence<double>> rows; };",
+        "enum Color { RED, GREEN }; struct Own { Color color; };",
+        "struct Own { wchar letter; };",
+        "struct Own { long double x; };",
+        "struct Base { double x; }; struct Own : Base { double y; };",
+        "struct Own; struct Other { double x; };",
+        "struct Own { double",
+    ],
+)
+def test_what_ros_has_not_is_not_known(struct: str) -> None:
+    text = f"module my_msgs {{ module msg {{ {struct} }}; }};"
+    with pytest.raises(MessagePathError, match=r"the bag (defines it as no|does not define)"):
+        BagTypes({"my_msgs/msg/Own": text})("my_msgs/msg/Own")
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        "/*",
+        '"\\',
+        "module a {",
+        "sequence<",
+        "struct a { ",
+        "(",
+        "@",
+        "@a(",
+        "const long a = ",
+        "'",
+    ],
+)
+def test_idl_is_read_once_however_it_is_written(part: str) -> None:
+    begin = time.process_time()
+    parse_idl(part * (500_000 // len(part)))
+    assert time.process_time() - begin < 20.0
+
+
+@given(st.lists(st.sampled_from([*IDL.split(), "{", "}", ";", "<", ">", "[", "]"])))
+def test_any_words_are_definitions_in_idl_or_none(words: list[str]) -> None:
+    for name, (_, fields) in parse_idl(" ".join(words)).items():
+        assert name
+        assert all(isinstance(field, str) for field, _ in fields)
 
 
 @given(st.text())

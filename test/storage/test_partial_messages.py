@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
-from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
+from rebt_ros.storage.message_definitions import parse_definitions
 from rebt_ros.storage.partial_messages import PartialDecoder
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
@@ -70,10 +70,41 @@ def test_sequences_of_messages_are_read_whole() -> None:
     assert [one.pose.position.y for one in plan.poses] == [0.0, 8.0]
 
 
-def test_wide_strings_are_not_read_here() -> None:
-    definitions = {"a/msg/B": ([], [("text", (Nodetype.BASE, ("wstring", 0)))])}
-    with pytest.raises(NotImplementedError):
-        PartialDecoder("a/msg/B", [("text",)], definitions)
+def test_wide_strings_and_arrays_of_strings_are_read_as_ros_writes_them() -> None:
+    messages = pytest.importorskip("test_msgs.msg")
+    serialize = pytest.importorskip("rclpy.serialization").serialize_message
+    message = messages.WStrings(
+        wstring_value="a\u00e9\U0001f600",
+        array_of_wstrings=["", "x", "\u30cf"],
+        unbounded_sequence_of_wstrings=["yz"],
+    )
+    text = (
+        "wstring wstring_value\nwstring a\nwstring b\nwstring wstring_value_default3\n"
+        "wstring[3] array_of_wstrings\nwstring[<=3] c\nwstring[] unbounded_sequence_of_wstrings\n"
+    )
+    name = "test_msgs/msg/WStrings"
+    read: Any = PartialDecoder(name, [()], parse_definitions(name, text)).decode(serialize(message))
+    assert read.wstring_value == message.wstring_value
+    assert read.wstring_value_default3 == message.wstring_value_default3
+    assert read.array_of_wstrings == message.array_of_wstrings
+    assert read.unbounded_sequence_of_wstrings == ["yz"]
+    arrays = messages.Arrays(string_values=["", "go", "stop"], string_values_default=["1", "", "3"])
+    kinds = "bool byte char float32 float64 int8 uint8 int16 uint16 int32 uint32 int64 uint64"
+    before = "".join(f"{one}[3] of_{one}\n" for one in kinds.split())
+    definitions = parse_definitions("a/msg/B", f"{before}string[3] texts\n")
+    found: Any = PartialDecoder("a/msg/B", [("texts",)], definitions).decode(serialize(arrays))
+    assert found.texts == ["", "go", "stop"]
+
+
+def test_a_wide_string_of_whole_characters_is_read_and_one_that_is_cut_is_refused() -> None:
+    definitions = parse_definitions("a/msg/B", "wstring text\n")
+    decoder = PartialDecoder("a/msg/B", [("text",)], definitions)
+    for text in ("", "go", "\U0001f600"):
+        data = b"\0\1\0\0" + struct.pack("<I", len(text)) + text.encode("utf-32-le")
+        read: Any = decoder.decode(data)
+        assert read.text == text
+    with pytest.raises(ValueError, match="longer than its message"):
+        decoder.decode(data[:-1])
 
 
 TOPICS = sorted(some.MESSAGES)

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -266,22 +267,64 @@ def test_a_real_full_disk_is_an_error(tmp_path, monkeypatch):
         RecordingWriter(tmp_path, FEATURES, ["/action"])
 
 
-def test_a_recording_that_was_moved_before_its_end_is_not_said_to_be_there(tmp_path):
-    for move in (Path.unlink, lambda path: path.rename(tmp_path / "elsewhere")):
-        writer = RecordingWriter(tmp_path / "shown", FEATURES, ["/action"])
-        writer.write(Row(1, "/action", "go", None, (0.0,) * len(FEATURES)))
-        move(writer.path)
-        with pytest.raises(RecordingError, match="its 1 rows are not there"):
-            writer.close()
-        # It is closed all the same.
-        writer.close()
+def test_a_recording_that_was_moved_is_said_to_be_where_it_is(tmp_path):
+    shown, elsewhere = tmp_path / "shown", tmp_path / "elsewhere"
+    with RecordingWriter(shown, FEATURES, ["/action"]) as writer:
+        writer.write(ROWS[0])
+        writer.look()
+        shown.rename(elsewhere)
+        there = re.escape(str(elsewhere / writer.path.name))
+        for end in (writer.look, writer.close):
+            with pytest.raises(RecordingError, match=f"was moved .*: its 1 rows are in {there}"):
+                end()
+    # It is closed all the same.
+    [path] = elsewhere.iterdir()
+    assert len(read_recording(path).demonstration) == 1
 
 
-def test_rows_are_not_acknowledged_into_a_removed_file(tmp_path):
-    with RecordingWriter(tmp_path, FEATURES, ["/action"]) as writer:
-        writer.path.unlink()
-        with pytest.raises(RecordingError, match="was removed"):
-            writer.write(ROWS[0])
+def test_what_was_moved_is_not_said_to_be_discarded(tmp_path):
+    writer = RecordingWriter(tmp_path / "shown", FEATURES, ["/action"])
+    writer.write(ROWS[0])
+    (tmp_path / "shown").rename(tmp_path / "elsewhere")
+    with pytest.raises(RecordingError, match=r"its 1 rows are in .*elsewhere"):
+        writer.discard()
+    writer = RecordingWriter(tmp_path / "shown", FEATURES, ["/action"])
+    writer.write(ROWS[0])
+    writer.close()
+    (tmp_path / "shown").rename(tmp_path / "gone")
+    with pytest.raises(RecordingError, match="cannot be removed"):
+        writer.discard()
+
+
+@pytest.mark.parametrize("is_replaced", [False, True])
+@pytest.mark.parametrize("notice", ["write", "look", "close"])
+def test_a_recording_that_is_removed_is_written_again(tmp_path, notice, is_replaced):
+    told = []
+    with RecordingWriter(tmp_path / "shown", FEATURES, ["/action"], told=told.append) as writer:
+        writer.write(ROWS[0])
+        shutil.rmtree(tmp_path / "shown")
+        if is_replaced:
+            (tmp_path / "shown").mkdir()
+            writer.path.write_text("something else")
+        if notice == "look":
+            writer.look()
+        if notice != "close":
+            writer.write(ROWS[1])
+    assert len(told) == 1
+    assert f"was removed while it was written: its 1 rows are in {writer.path} again" in told[0]
+    rows = 1 if notice == "close" else 2
+    assert len(list((tmp_path / "shown").iterdir())) == 1 + is_replaced
+    assert len(read_recording(writer.path).demonstration) == rows
+
+
+def test_rows_that_cannot_be_written_again_are_said_to_be_lost(tmp_path):
+    with RecordingWriter(tmp_path / "shown", FEATURES, ["/action"]) as writer:
+        writer.write(ROWS[0])
+        shutil.rmtree(tmp_path / "shown")
+        (tmp_path / "shown").touch()
+        for end in (writer.look, lambda: writer.write(ROWS[1]), writer.close):
+            with pytest.raises(RecordingError, match=r"written again .*: its 1 rows are lost"):
+                end()
 
 
 def test_rows_are_synced_when_asked_for_and_at_the_end(tmp_path, monkeypatch):

@@ -411,6 +411,13 @@ def test_a_column_that_is_called_like_labels_and_is_not_the_last_is_noted(
     assert f"{name!r} is a feature: name the label column if it is that one" in read.notes[0]
 
 
+@pytest.mark.parametrize(("separator", "called"), [("\uff0c", "commas"), ("\uff1b", "semicolons")])
+def test_wide_separators_are_separators(separator: str, called: str, tmp_path: Path) -> None:
+    read = _read(tmp_path, "x,y,动作\n1,2,前进\n3,4,停止\n".replace(",", separator))
+    assert read.demonstration.states.tolist() == [[1, 2], [3, 4]]
+    assert f"cells are separated by wide {called}" in read.notes
+
+
 def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Path) -> None:
     read = _read(tmp_path, 'x,a\n"1,207",go\n"3,512",turn\n')
     assert read.demonstration.states[:, 0].tolist() == [1207, 3512]
@@ -429,6 +436,14 @@ def test_an_amount_that_is_written_both_ways_is_one_with_thousands(tmp_path: Pat
         (["1.234.567", "312"], [1_234_567, 312]),
         (["\u22120.5", "0.25"], [-0.5, 0.25]),
         (["\u22121,5 m", "2 m"], [-1.5, 2]),
+        (["(0.5)", "0.25", "(1,250.5)"], [-0.5, 0.25, -1250.5]),
+        (["(5 m)", "2 m"], [-5, 2]),
+        (["1,23,456", "12,34,56,789.5", "1,207"], [123456, 123456789.5, 1207]),
+        (["€ 0,5", "€12,25", "-€ 3"], [0.5, 12.25, -3]),
+        (["$1,207.50", "$5", "($2)"], [1207.5, 5, -2]),
+        (['="0.5"', '="-2"'], [0.5, -2]),
+        (["٠٫٥", "١٢"], [0.5, 12]),
+        (["１．５", "－２"], [1.5, -2]),
     ],
 )
 def test_numbers_are_read_as_people_write_them(
@@ -914,6 +929,27 @@ def test_what_says_the_action_in_other_words_is_no_feature(label: str, tmp_path:
     rows[0][1] = "2"
     read = _read(tmp_path, _written(rows, ["x", f"{label}_id", "command", label]))
     assert [one.name for one in read.demonstration.features] == ["x", f"{label}_id", "command"]
+
+
+def test_a_column_that_holds_the_actions_word_for_word_is_noted_or_no_feature(
+    tmp_path: Path,
+) -> None:
+    rows = [[str(x), "abc"[x % 3], "abc"[x % 3]] for x in range(9)]
+    read = _read(tmp_path, _written(rows, ["x", "label", "action"]))
+    assert [one.name for one in read.demonstration.features] == ["x"]
+    read = _read(tmp_path, _written(rows, ["x", "command", "action"]))
+    assert [one.name for one in read.demonstration.features] == ["x", "command"]
+    assert any("'command' holds the action of each row, word for word" in n for n in read.notes)
+
+
+def test_what_nobody_sees_makes_no_other_actions(tmp_path: Path) -> None:
+    text = "x,action\n1,f\u00e4hrt\n2,fa\u0308hrt\n3,f\u00e4hrt\u200b\n4\u200b,h\u00e4lt\n"
+    for end in ("\n", "\r\n", "\u2028", "\x85"):
+        read = _read(tmp_path, text.replace("\n", end))
+        assert read.demonstration.actions == ("f\u00e4hrt", "h\u00e4lt")
+        assert read.demonstration.states[:, 0].tolist() == [1, 2, 3, 4]
+        assert [note for note in read.notes if "nobody sees" in note]
+        assert [note for note in read.notes if "accents" in note]
 
 
 def test_a_column_for_each_action_is_noted(tmp_path: Path) -> None:

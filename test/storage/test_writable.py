@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from rebt_ros.storage import writable as module
 from rebt_ros.storage.writable import WritableDirectory
 
 
@@ -39,3 +40,18 @@ def test_what_cannot_be_written_is_said_until_it_can(
     (tmp_path / "file").unlink()
     (tmp_path / "nowhere").mkdir()
     assert bool(writable.why_not(tmp_path / place)) == place.startswith("/proc")
+
+
+def test_a_disk_that_has_become_full_is_found_where_it_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(**_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    writable = WritableDirectory()
+    assert writable.why_not(tmp_path) == ""
+    with monkeypatch.context() as patch:
+        patch.setattr(module.tempfile, "TemporaryFile", full)
+        assert writable.why_not(tmp_path) == ""
+        assert "No space left on device" in writable.why_not(tmp_path, again=True)
+    assert writable.why_not(tmp_path, again=True) == ""

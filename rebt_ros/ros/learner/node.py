@@ -38,7 +38,7 @@ from rebt_ros.ros import lifetime
 from rebt_ros.ros.diagnostics import Diagnostics, Level, Report
 from rebt_ros.ros.graph_watch import Finding, GraphWatch
 from rebt_ros.ros.learner.settings import declare_settings
-from rebt_ros.storage.atomic import write_text_atomically
+from rebt_ros.storage.atomic import StorageError, write_text_atomically
 from rebt_ros.storage.shared_directory import SharedDirectory, Use
 from rebt_ros.storage.tree_file import find_tree
 from rebt_ros.storage.tree_versions import TreeVersions
@@ -266,7 +266,9 @@ class LearnerNode(Node):
         except LearningError as err:
             # Its end is none of a node's faults.
             if self.context.ok():
-                self.get_logger().warning(f"not all files of the tree were written: {err}")
+                said = f"not all files beside the tree were written: {err}"
+                self.get_logger().warning(said)
+                self._last = Report(Level.WARN, f"{self._last.message} {said}")
             return
         self._log(notes)
         self.get_logger().info(f"summary and pictures of the tree are in {directory.absolute()}.")
@@ -304,6 +306,17 @@ class LearnerNode(Node):
             return f"rules_file cannot be read ({err}), so that no tree is published"
         return ""
 
+    def _unkept(self) -> str:
+        """That the published tree is on disk no more, without a full stop; else empty."""
+        with suppress(RebtError):
+            path = self._settings.output() / _TREE_FILE
+            if self._learned is not None and not path.exists():
+                return (
+                    f"the tree that is published is not in {path.absolute()}, and is gone once "
+                    "this node ends: ~/relearn writes it again"
+                )
+        return ""
+
     def _unwritable(self) -> str:
         """Why no tree can be written, without a full stop; else empty."""
         with suppress(RebtError):
@@ -334,7 +347,8 @@ class LearnerNode(Node):
         return learned
 
     def _versions(self) -> TreeVersions:
-        return TreeVersions(self._settings.output() / _TREES, self._settings.kept_trees())
+        trees = self._settings.output().absolute() / _TREES
+        return TreeVersions(trees, self._settings.kept_trees())
 
     def _rollback(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Publishes the tree before; where none is published, the newest one that was."""
@@ -350,6 +364,9 @@ class LearnerNode(Node):
                 learned = loads(document)
             except (RebtError, OSError) as err:
                 response.message = str(err)
+                self.get_logger().warning(f"nothing was published: {err}")
+                if isinstance(err, (StorageError, OSError)):
+                    self._last = Report(Level.WARN, f"nothing was published: {err}")
                 return response
             self._figures = {}
             self._publish(learned, document)
@@ -372,8 +389,8 @@ class LearnerNode(Node):
                     self.get_logger().warning(f"the published tree was not drawn: {err}")
                 return
             self.get_logger().info(
-                f"the pictures in {directory.absolute()} are of the published tree; summary.json "
-                "and the decision tree are of what was learned last."
+                f"the pictures in {directory.absolute()} are of the published tree; summary.json, "
+                "learning.npz and the decision tree are of what was learned last."
             )
 
         threading.Thread(target=draw, daemon=True).start()
@@ -517,7 +534,13 @@ class LearnerNode(Node):
             "trees",
             "executors without a parameter 'learner' follow one by chance; stop all but one",
         )
-        said = (self._uncounted, self._unruled(), self._unwritable(), self._shared())
+        said = (
+            self._uncounted,
+            self._unruled(),
+            self._unwritable(),
+            self._shared(),
+            self._unkept(),
+        )
         unfit = [Finding(one, waits=False) for one in said if one]
         problems = self._watch.say([*several, *unfit])
         if problems:

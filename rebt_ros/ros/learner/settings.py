@@ -64,7 +64,7 @@ class LearnerSettings:
             OptionError: A directory makes no sense.
         """
         return Request(
-            str(self.demonstrations()),
+            str(self.demonstrations().absolute()),
             {name: read() for name, read in self.options.items()},
             self.binary(),
             self.categorical(),

@@ -201,6 +201,7 @@ class RecorderNode(Node):
             origin=origin,
             robot=settings.robot,
             categories=self._categories,
+            told=lambda text: self._faults.note("recording removed", text),
         )
         self.get_logger().info(f"recording to {writer.path}.")
         return writer
@@ -415,7 +416,10 @@ class RecorderNode(Node):
             [
                 *watch.timeless(),
                 *unfit,
-                *watch.unheard(self._demonstrators),
+                *watch.unheard(
+                    self._demonstrators,
+                    {one.topic_name: "set state_qos to sensor_data" for one in plain},
+                ),
                 *watch.mixed(plain),
                 *watch.latched(one for one in plain if one.topic_name not in known),
                 *watch.misfits(self._driven),
@@ -460,7 +464,8 @@ class RecorderNode(Node):
     def _record(self, request: SetBool.Request, stamp: int) -> Answer:
         if not request.data:
             return self._session.stop(stamp)
-        if why := self._writable.why_not(self._settings.demonstrations):
+        failed = bool(self._session.failure)
+        if why := self._writable.why_not(self._settings.demonstrations, again=failed):
             return Answer(False, f"not recording: {why}.")
         return self._with_what_is_missing(self._session.start(stamp))
 
@@ -528,6 +533,7 @@ class RecorderNode(Node):
     def _report(self) -> Report:
         now = time.monotonic()
         session = self._session
+        session.look(self._stamp(time.time_ns()))
         self._count_losses()
         values: dict[str, object] = {
             "rows": session.rows,
