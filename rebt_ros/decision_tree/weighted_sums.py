@@ -11,7 +11,7 @@ description of the rows (see `description_length`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -19,16 +19,18 @@ import numpy as np
 
 from rebt_ros.arrays import BoolArray, FloatArray, IntArray
 from rebt_ros.decision_tree.description_length import shortest_description
-from rebt_ros.decision_tree.encoding import Number
+from rebt_ros.decision_tree.encoding import Number, Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.demonstration.builder import LARGEST_VALUE
 from rebt_ros.demonstration.schema import FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import WeightedSum
+from rebt_ros.logic.conditions import Difference, WeightedSum
 
 #: Number of sums offered, and of sums tried for each.
 _MOST_SUMS, _MOST_TRIED = 4, 5
+#: Share of the description that a plain sum saves at least: there are many of them.
+_LEAST_SAVED = 0.1
 #: Fewer distinct values are counts, or positions on a grid, which nobody weighs.
 _LEAST_VALUES = 20
 #: Only this many features, the first ones, make sums.
@@ -68,18 +70,16 @@ def likely_sums(
         return ()
     describing = _Describing(table, options, len(measured))
     best = _Described(fitted, (), shortest_description(fitted).bits)
+    plain = _plain(options.vocabulary, [table.features[place].name for place in measured])
     while len(best.sums) < _MOST_SUMS:
-        found = [
-            one
-            for one in dict.fromkeys(_lines(table, best.fitted, measured))
-            if one not in best.sums
+        lines = tuple(dict.fromkeys(_lines(table, best.fitted, measured)))
+        tried = [
+            *describing.shorter(best, plain, (1 - _LEAST_SAVED) * best.bits),
+            *describing.shorter(best, lines, best.bits),
         ]
-        likely = describing.likely(best, found)
-        tried = [describing.by((*best.sums, one)) for one in likely]
-        shortest = min(tried, key=lambda one: one.bits, default=best)
-        if shortest.bits >= best.bits:
+        if not tried:
             break
-        best = shortest
+        best = min(tried, key=lambda one: one.bits)
     return best.sums
 
 
@@ -114,7 +114,16 @@ class _Describing:
         )
         return _Described(fitted, sums, shortest_description(fitted).bits + stating)
 
-    def likely(self, best: _Described, found: Sequence[WeightedSum]) -> Sequence[WeightedSum]:
+    def shorter(
+        self, best: _Described, found: Sequence[WeightedSum], bits: float
+    ) -> Iterator[_Described]:
+        """Descriptions with one more sum that take fewer bits than this."""
+        for one in self._likely(best, [one for one in found if one not in best.sums]):
+            described = self.by((*best.sums, one))
+            if described.bits < bits:
+                yield described
+
+    def _likely(self, best: _Described, found: Sequence[WeightedSum]) -> Sequence[WeightedSum]:
         """The further sums that a tree with all of them uses most.
 
         None if not even this tree has a shorter description.
@@ -130,6 +139,19 @@ class _Describing:
     def _fitted(self, sums: tuple[WeightedSum, ...]) -> FittedTree:
         vocabulary = self._options.vocabulary.with_more(sums)
         return fit(self._table, replace(self._options, vocabulary=vocabulary))
+
+
+def _plain(vocabulary: Vocabulary, measured: Collection[str]) -> tuple[WeightedSum, ...]:
+    """The sums of features whose differences are tested.
+
+    Whoever goes along the longer of two ways goes by ``x − y`` and ``x + y``: no line separates
+    what they do to the left from what they do ahead.
+    """
+    return tuple(
+        WeightedSum(((one.minuend, 1.0), (one.subtrahend, 1.0)))
+        for one in vocabulary.combinations
+        if isinstance(one, Difference) and {one.minuend, one.subtrahend} <= set(measured)
+    )
 
 
 def _term_bits(features: int, digits: int = _USUAL) -> float:

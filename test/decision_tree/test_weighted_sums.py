@@ -13,7 +13,7 @@ from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.decision_tree.weighted_sums import likely_sums
 from rebt_ros.demonstration.schema import Feature, FeatureKind
 from rebt_ros.demonstration.table import DemonstrationTable
-from rebt_ros.logic.conditions import WeightedSum
+from rebt_ros.logic.conditions import Difference, WeightedSum
 
 NAMES = ("gap", "speed", "noise")
 
@@ -55,6 +55,46 @@ def test_the_line_between_two_actions_is_found_by_its_own_features() -> None:
     assert line.terms[0][1] == 1
     with_it = fit(table, FitOptions(Vocabulary(combinations=(line,))))
     assert with_it.leaves <= fit(table).leaves / 3
+
+
+PLACES = tuple(map(Feature, ("food_x", "food_y", "nest_x", "nest_y", "fox_x", "fox_y", "hungry")))
+PAIRS = Vocabulary(
+    combinations=(
+        Difference("food_x", "food_y"),
+        Difference("nest_x", "nest_y"),
+        Difference("fox_x", "fox_y"),
+    )
+)
+
+
+def along_the_longer_way(states: FloatArray) -> FloatArray:
+    """Left, right, down or up: away from a fox that is near, else to the food or to the nest."""
+    food, nest, fox, hungry = states[:, :2], states[:, 2:4], states[:, 4:6], states[:, 6:] > 0
+    near = np.hypot(*fox.T)[:, np.newaxis] < 0.3
+    right, up = np.where(near, -fox, np.where(hungry, food, nest)).T
+    return np.where(np.abs(right) > np.abs(up), right > 0, 2 + (up > 0))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_who_goes_along_the_longer_way_goes_by_sums_as_well_as_differences(seed: int) -> None:
+    states = np.random.default_rng(seed).uniform(-1, 1, (800, 7))
+    table = shown(states, along_the_longer_way(states), PLACES)
+    options = FitOptions(PAIRS)
+    fitted = fit(table, options)
+    sums = likely_sums(table, fitted, options)
+    plain = [WeightedSum(((f"{one}_x", 1.0), (f"{one}_y", 1.0))) for one in ("food", "nest")]
+    assert set(plain) <= set(sums)
+    assert fit(table, FitOptions(PAIRS.with_more(sums))).leaves < 0.8 * fitted.leaves
+
+
+def test_a_plain_sum_that_saves_little_is_none() -> None:
+    states = np.random.default_rng(0).uniform(-1, 1, (800, 7))
+    right, up = states[:, 0], states[:, 1]
+    # Seven rows of the other action, beyond a line.
+    chosen = (right > up) | (right + up > np.sort(right + up)[-8])
+    table = shown(states, chosen, PLACES)
+    options = FitOptions(PAIRS)
+    assert likely_sums(table, fit(table, options), options) == ()
 
 
 @pytest.mark.parametrize("seed", range(4))
