@@ -331,8 +331,10 @@ class _Choice:
         asked = self._options.history
         if asked is not None:
             return asked
+        differences = self._likely_differences(states_alone)
         before, after = (
-            self._smallest_explanation(replace(states_alone, history=one)) for one in _HISTORIES
+            self._smallest_explanation(replace(states_alone, history=one), differences)
+            for one in _HISTORIES
         )
         if _always_changes(self._telling):
             return self._history_of_changes(before, after)
@@ -353,10 +355,12 @@ class _Choice:
     def _explanation(self, vocabulary: Vocabulary) -> _Explanation:
         return _Explanation(self._fitted(vocabulary), 0)
 
-    def _smallest_explanation(self, vocabulary: Vocabulary) -> _Explanation:
-        """Without differences, or with all those that a tree makes use of."""
+    def _smallest_explanation(
+        self, vocabulary: Vocabulary, differences: tuple[Difference, ...]
+    ) -> _Explanation:
+        """Without these differences, or with them."""
         found = [self._explanation(vocabulary)]
-        if differences := self._likely_differences(vocabulary):
+        if differences:
             fitted = self._fitted(vocabulary.with_more(differences))
             found.append(_Explanation(fitted, len(differences)))
         return min(found, key=lambda one: one.size)
