@@ -74,7 +74,7 @@ def likely_sums(
     while len(best.sums) < _MOST_SUMS:
         lines = tuple(dict.fromkeys(_lines(table, best.fitted, measured)))
         tried = [
-            *describing.shorter(best, plain, (1 - _LEAST_SAVED) * best.bits),
+            *describing.shorter(best, plain, (1 - _LEAST_SAVED) * best.bits, most=0),
             *describing.shorter(best, lines, best.bits),
         ]
         if not tried:
@@ -115,26 +115,24 @@ class _Describing:
         return _Described(fitted, sums, shortest_description(fitted).bits + stating)
 
     def shorter(
-        self, best: _Described, found: Sequence[WeightedSum], bits: float
+        self, best: _Described, found: Sequence[WeightedSum], bits: float, most: int = _MOST_TRIED
     ) -> Iterator[_Described]:
-        """Descriptions with one more sum that take fewer bits than this."""
-        for one in self._likely(best, [one for one in found if one not in best.sums]):
+        """Descriptions with one more sum that take fewer bits than this.
+
+        Of more than `most` sums, those that a tree with all of them uses most are tried; none if
+        not even this tree has a shorter description.
+        """
+        further = [one for one in found if one not in best.sums]
+        if len(further) > most:
+            fitted = self._fitted((*best.sums, *further))
+            if shortest_description(fitted).bits >= bits:
+                return
+            gains = dict(zip(fitted.asked, fitted.gains.tolist(), strict=True))
+            further.sort(key=lambda one: -gains[Number(one)])
+        for one in further[:_MOST_TRIED]:
             described = self.by((*best.sums, one))
             if described.bits < bits:
                 yield described
-
-    def _likely(self, best: _Described, found: Sequence[WeightedSum]) -> Sequence[WeightedSum]:
-        """The further sums that a tree with all of them uses most.
-
-        None if not even this tree has a shorter description.
-        """
-        if len(found) <= _MOST_TRIED:
-            return found
-        fitted = self._fitted((*best.sums, *found))
-        if shortest_description(fitted).bits >= best.bits:
-            return ()
-        gains = dict(zip(fitted.asked, fitted.gains.tolist(), strict=True))
-        return sorted(found, key=lambda one: -gains[Number(one)])[:_MOST_TRIED]
 
     def _fitted(self, sums: tuple[WeightedSum, ...]) -> FittedTree:
         vocabulary = self._options.vocabulary.with_more(sums)

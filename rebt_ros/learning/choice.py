@@ -12,7 +12,8 @@ Cross-validation judges on rows that a tree was not learned from.  These are the
   one; there it may only if states hardly determine what to do;
 - whether it may test weighted sums of features: if they shorten the description of the rows (see
   `weighted_sums`), unless that costs both agreement and mean recall;
-- whether it may test differences of features, by agreement and size;
+- whether it may test differences of features, by agreement and size, or where they clearly raise
+  mean recall and make the explanation no larger;
 - the pruning level, by mean recall, and by the size of the explanation if recall leaves much open:
   pruning has to pay (see `judged_levels`);
 - PSA nodes, by own-history agreement.
@@ -36,7 +37,7 @@ from rebt_ros.decision_tree.differences import likely_differences
 from rebt_ros.decision_tree.encoding import FEATURES_ALONE, Vocabulary
 from rebt_ros.decision_tree.fitted import FittedTree
 from rebt_ros.decision_tree.simplest import simplest
-from rebt_ros.decision_tree.training import fit
+from rebt_ros.decision_tree.training import FitOptions, fit
 from rebt_ros.decision_tree.upsampling import Upsampling
 from rebt_ros.decision_tree.weighted_sums import likely_sums
 from rebt_ros.demonstration.demonstration import RowKind
@@ -258,6 +259,7 @@ class _Choice:
         self._telling = part_of(self.shown, _ROWS_THAT_TELL) if large else self.shown
         self._made: dict[tuple[bool, Vocabulary], CrossValidation] = {}
         self._likely: dict[Vocabulary, tuple[Difference, ...]] = {}
+        self._fits: dict[FitOptions, FittedTree] = {}
         self.reasons: list[str] = []
 
     def judged(self, vocabulary: Vocabulary, *, telling: bool = False) -> CrossValidation:
@@ -291,7 +293,7 @@ class _Choice:
         # A difference needs no weights.
         at_hand = vocabulary.with_more(self._likely_differences(vocabulary))
         how = replace(fit_options(options, at_hand), upsample=Upsampling.NONE)
-        sums = likely_sums(self._telling, fit(self._telling, how), how)
+        sums = likely_sums(self._telling, self._fit(how), how)
         with_them = vocabulary.with_more(sums)
         if not sums or options.sums is Use.ALWAYS:
             return with_them
@@ -365,6 +367,11 @@ class _Choice:
             found.append(_Explanation(fitted, len(differences)))
         return min(found, key=lambda one: one.size)
 
+    def _no_larger(self, vocabulary: Vocabulary, differences: tuple[Difference, ...]) -> bool:
+        """Whether an explanation is no larger with differences, each of which counts as a leaf."""
+        with_them = self._fitted(vocabulary.with_more(differences)).explanation + len(differences)
+        return with_them <= self._fitted(vocabulary).explanation
+
     def _explained(self, before: _Explanation, after: _Explanation) -> tuple[History | None, str]:
         """What explanations say about the previous action, and why; None where they leave it open.
 
@@ -418,7 +425,12 @@ class _Choice:
 
     def _fitted(self, vocabulary: Vocabulary) -> FittedTree:
         """A tree fitted to the rows that decide what a tree may test."""
-        return fit(self._telling, fit_options(self._options, vocabulary))
+        return self._fit(fit_options(self._options, vocabulary))
+
+    def _fit(self, how: FitOptions) -> FittedTree:
+        if how not in self._fits:
+            self._fits[how] = fit(self._telling, how)
+        return self._fits[how]
 
     def _sizes(self, *fits: FittedTree) -> tuple[int, ...]:
         """Sizes of the unpruned behavior trees; 0 for all if one of them is very large."""
@@ -468,6 +480,10 @@ class _Choice:
         )
         if smaller and agreements[1] >= agreements[0] - _DEARER:
             self.reasons.append(f"Differences of features make a smaller tree ({compared}).")
+            return more
+        raised = clearly_raised(before, after) and agreements[1] >= agreements[0]
+        if raised and self._no_larger(vocabulary, differences):
+            self.reasons.append(f"Differences of features make a better tree ({compared}).")
             return more
         self.reasons.append(f"Differences of features make no better tree ({compared}).")
         return vocabulary

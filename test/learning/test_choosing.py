@@ -658,6 +658,47 @@ def diagonal(rows: int = 400) -> DemonstrationTable:
     return replace(plain, features=(Feature("left"), Feature("right")), states=sides)
 
 
+def sorting(seed: int, demonstrations: int = 3, parts: int = 4) -> DemonstrationTable:
+    """Brings parts to the bins of their colors, which stand elsewhere in each demonstration."""
+    random = np.random.default_rng(seed)
+    states: list[tuple[float, ...]] = []
+    labels: list[str] = []
+    numbers: list[int] = []
+
+    def row(number: int, label: str, *state: float) -> None:
+        states.append(state)
+        labels.append(label)
+        numbers.append(number)
+
+    for number in range(demonstrations):
+        bins = random.permutation(np.arange(1, 7))[:2].tolist()
+        for color in random.integers(0, 2, parts).tolist():
+            goal = bins[color]
+            row(number, "pick", 0, 2, *bins)
+            for place in range(goal):
+                row(number, "right", place, color, *bins)
+            row(number, "drop", goal, color, *bins)
+            for place in range(goal, 0, -1):
+                row(number, "left", place, 2, *bins)
+    features = (
+        Feature("place"),
+        Feature("held", FeatureKind.CATEGORICAL, ("0", "1", "2")),
+        Feature("red_bin"),
+        Feature("blue_bin"),
+    )
+    plain = table([row[0] for row in states], labels, numbers)
+    return replace(plain, features=features, states=np.array(states), row_kind=RowKind.SAMPLE)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 9])
+def test_a_difference_that_clearly_raises_recall_is_tested_in_a_tree_of_the_same_size(
+    seed: int,
+) -> None:
+    policy = choose(sorting(seed), LearnOptions())
+    assert policy.fitted.vocabulary.combinations
+    assert any("Differences of features make a better tree" in one for one in policy.reasons)
+
+
 @pytest.mark.parametrize("use", [Use.AUTO, Use.ALWAYS])
 def test_a_difference_that_makes_a_much_smaller_tree_is_tested(use: Use) -> None:
     policy = choose(diagonal(), LearnOptions(differences=use))
