@@ -285,6 +285,8 @@ def test_learning_can_be_cancelled_and_the_tree_before_stays(
         trees = peer.listen(String, "behavior_tree", LATCHED)
         assert peer.call("/learner/relearn").success
         before = _latest(peer, trees, 1)
+        # Those that are still being written would be cancelled, too, and missed.
+        learner.says("summary and pictures of the tree are in")
         _record(tmp_path / "demonstrations")
         child, call = _stuck(peer)
         assert _children(learner.process.pid) == {child}

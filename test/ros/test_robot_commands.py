@@ -199,7 +199,10 @@ def test_a_command_that_cannot_be_ends_the_executor_with_a_sentence(
         ("{send: /a}", "line 5: commands.go needs one of publish, call, action"),
         ("{publish: /a}", "commands.go needs a 'type', such as geometry_msgs/msg/Twist"),
         ("{publish: /a, type: b, when: always}", "commands.go.when must be one of tick, once"),
-        ("{publish: /a, type: b, message: 3}", "commands.go.message must be a map, not 3"),
+        (
+            "{publish: /a, type: b, message: 3}",
+            "commands.go.message must be a map, of names and what they stand for, not 3",
+        ),
         ("{call: /a, type: b, message: {}}", "commands.go.message is unknown here"),
     ],
 )
