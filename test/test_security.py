@@ -43,7 +43,7 @@ FORBIDDEN_CALLS = frozenset(
 
 
 def _calls(module: Module) -> Iterator[tuple[ast.Call, str]]:
-    for node in ast.walk(module.tree):
+    for node in module.parts:
         if isinstance(node, ast.Call):
             yield node, ast.unparse(node.func)
 
@@ -70,7 +70,7 @@ def test_what_formats_text_is_written_in_the_source() -> None:
             function = call.func
             if isinstance(function, ast.Attribute) and function.attr in {"format", "format_map"}:
                 strays += [] if constant(function.value) else [f"{module}:{call.lineno}"]
-        for node in ast.walk(module.tree):
+        for node in module.parts:
             # A remainder of numbers looks the same; texts on its left are what matters.
             if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
                 strays += (
