@@ -514,7 +514,7 @@ def test_what_is_no_recording_is_named_and_a_tree_that_was_removed_is_missed(
 ) -> None:
     (tmp_path / "demonstrations").mkdir()
     (tmp_path / "demonstrations" / "table.csv").write_text("x,label\n1,go\n2,stop\n")
-    with NodeProcess("learner_node", domain, tmp_path):
+    with NodeProcess("learner_node", domain, tmp_path) as learner:
         answer = peer.call("/learner/relearn")
         assert not answer.success
         assert "table.csv is none; the command `learn` reads tables and bags" in answer.message
@@ -523,6 +523,8 @@ def test_what_is_no_recording_is_named_and_a_tree_that_was_removed_is_missed(
         assert answer.success
         assert "table.csv" in answer.message
         assert _status(peer, "It is published").level == DiagnosticStatus.OK
+        # What is still being written would be there again.
+        learner.says("summary and pictures of the tree are in")
         shutil.rmtree(tmp_path / "learned")
         missed = _status(peer, f"is not in {tmp_path / 'learned' / 'tree.json'}, and is gone once")
         assert missed.level == DiagnosticStatus.WARN
