@@ -335,8 +335,12 @@ class _Choice:
             return asked
         differences = self._likely_differences(states_alone)
         before, after = (
-            self._smallest_explanation(replace(states_alone, history=one), differences)
-            for one in _HISTORIES
+            min(
+                self._explanation(one),
+                self._explanation(one, differences),
+                key=lambda its: its.size,
+            )
+            for one in (replace(states_alone, history=history) for history in _HISTORIES)
         )
         if _always_changes(self._telling):
             return self._history_of_changes(before, after)
@@ -354,23 +358,11 @@ class _Choice:
         )
         return History.PREVIOUS if raised else History.NONE
 
-    def _explanation(self, vocabulary: Vocabulary) -> _Explanation:
-        return _Explanation(self._fitted(vocabulary), 0)
-
-    def _smallest_explanation(
-        self, vocabulary: Vocabulary, differences: tuple[Difference, ...]
+    def _explanation(
+        self, vocabulary: Vocabulary, differences: tuple[Difference, ...] = ()
     ) -> _Explanation:
-        """Without these differences, or with them."""
-        found = [self._explanation(vocabulary)]
-        if differences:
-            fitted = self._fitted(vocabulary.with_more(differences))
-            found.append(_Explanation(fitted, len(differences)))
-        return min(found, key=lambda one: one.size)
-
-    def _no_larger(self, vocabulary: Vocabulary, differences: tuple[Difference, ...]) -> bool:
-        """Whether an explanation is no larger with differences, each of which counts as a leaf."""
-        with_them = self._fitted(vocabulary.with_more(differences)).explanation + len(differences)
-        return with_them <= self._fitted(vocabulary).explanation
+        """With further differences that are offered, if any."""
+        return _Explanation(self._fitted(vocabulary.with_more(differences)), len(differences))
 
     def _explained(self, before: _Explanation, after: _Explanation) -> tuple[History | None, str]:
         """What explanations say about the previous action, and why; None where they leave it open.
@@ -481,8 +473,11 @@ class _Choice:
         if smaller and agreements[1] >= agreements[0] - _DEARER:
             self.reasons.append(f"Differences of features make a smaller tree ({compared}).")
             return more
-        raised = clearly_raised(before, after) and agreements[1] >= agreements[0]
-        if raised and self._no_larger(vocabulary, differences):
+        if (
+            clearly_raised(before, after)
+            and agreements[1] >= agreements[0]
+            and self._explanation(vocabulary, differences).size <= self._explanation(vocabulary).size
+        ):
             self.reasons.append(f"Differences of features make a better tree ({compared}).")
             return more
         self.reasons.append(f"Differences of features make no better tree ({compared}).")
