@@ -476,7 +476,10 @@ class _Choice:
         if (
             clearly_raised(before, after)
             and agreements[1] >= agreements[0]
-            and self._explanation(vocabulary, differences).size <= self._explanation(vocabulary).size
+            and (
+                self._explanation(vocabulary, differences).size
+                <= self._explanation(vocabulary).size
+            )
         ):
             self.reasons.append(f"Differences of features make a better tree ({compared}).")
             return more
